@@ -1,5 +1,8 @@
 //! A finished picture.
 
+use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
+
 use crate::srgb::srgb_to_linear;
 
 /// Pixels in sRGB with straight (not premultiplied) alpha, 8 bits per channel, rows from the top.
@@ -10,7 +13,99 @@ pub struct Image {
     /// Rows.
     pub height_px: u32,
     /// R, G, B and A of each pixel, `width_px * height_px * 4` bytes.
-    pub rgba: Vec<u8>,
+    pub rgba: Pixels,
+}
+
+/// The bytes of a picture. They may lie in memory that a GPU has written and that other pictures get afterwards: then
+/// encoders read them in place, and only what changes or keeps them makes a copy.
+#[derive(Clone)]
+pub struct Pixels(Memory);
+
+/// Memory that holds the bytes of a picture until it is dropped.
+pub(crate) trait LentMemory: Send + Sync {
+    /// The bytes.
+    fn bytes(&self) -> &[u8];
+}
+
+#[derive(Clone)]
+enum Memory {
+    Own(Vec<u8>),
+    Lent(Arc<dyn LentMemory>),
+}
+
+impl Pixels {
+    /// Pixels in somebody else's memory.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn lent(memory: Arc<dyn LentMemory>) -> Self {
+        Self(Memory::Lent(memory))
+    }
+
+    /// The bytes as a vector: a copy, if they lie in memory of a GPU.
+    pub fn into_vec(self) -> Vec<u8> {
+        match self.0 {
+            Memory::Own(bytes) => bytes,
+            Memory::Lent(memory) => memory.bytes().to_vec(),
+        }
+    }
+}
+
+impl Deref for Pixels {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match &self.0 {
+            Memory::Own(bytes) => bytes,
+            Memory::Lent(memory) => memory.bytes(),
+        }
+    }
+}
+
+/// Bytes that lie in memory of a GPU are copied first.
+impl DerefMut for Pixels {
+    fn deref_mut(&mut self) -> &mut [u8] {
+        if let Memory::Lent(memory) = &self.0 {
+            self.0 = Memory::Own(memory.bytes().to_vec());
+        }
+        match &mut self.0 {
+            Memory::Own(bytes) => bytes,
+            Memory::Lent(_) => &mut [],
+        }
+    }
+}
+
+impl From<Vec<u8>> for Pixels {
+    fn from(bytes: Vec<u8>) -> Self {
+        Self(Memory::Own(bytes))
+    }
+}
+
+impl FromIterator<u8> for Pixels {
+    fn from_iter<I: IntoIterator<Item = u8>>(bytes: I) -> Self {
+        bytes.into_iter().collect::<Vec<u8>>().into()
+    }
+}
+
+impl<'a> IntoIterator for &'a Pixels {
+    type Item = &'a u8;
+    type IntoIter = std::slice::Iter<'a, u8>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl PartialEq for Pixels {
+    fn eq(&self, other: &Self) -> bool {
+        **self == **other
+    }
+}
+
+impl Eq for Pixels {}
+
+impl std::fmt::Debug for Pixels {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Pixels({} bytes)", self.len())
+    }
 }
 
 impl Image {

@@ -105,7 +105,7 @@ pub mod warning;
 
 pub use backend::{BackendKind, DrawError};
 pub use encode::EncodeError;
-pub use image::{Image, ImageFormat};
+pub use image::{Image, ImageFormat, Pixels};
 pub use import::{Format, MeshError, MeshFault};
 pub use library::{Error, Fault, Mesh, MeshReader, Picture, Renderer, Spec};
 pub use limits::{Deadline, LimitExceeded, Limits, Stopped};

@@ -171,9 +171,10 @@ mod tests {
 
     impl Renderer for Faulty {
         fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
-            let mut image = CpuRenderer::new(1).draw(plan, deadline)?;
-            (self.pixels)(&mut image.rgba);
-            Ok(image)
+            let image = CpuRenderer::new(1).draw(plan, deadline)?;
+            let mut rgba = image.rgba.into_vec();
+            (self.pixels)(&mut rgba);
+            Ok(Image { rgba: rgba.into(), ..image })
         }
 
         fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {

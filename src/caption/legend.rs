@@ -100,7 +100,7 @@ mod tests {
         let white = |width_px: u32, height_px: u32| Image {
             width_px,
             height_px,
-            rgba: vec![255; 4 * (width_px * height_px) as usize],
+            rgba: vec![255; 4 * (width_px * height_px) as usize].into(),
         };
         let mut image = white(400, 400);
         draw_legend(&mut image, &[scale(), scale()]);

@@ -81,7 +81,8 @@ mod tests {
 
     #[test]
     fn marks_are_where_they_are_said_to_be_and_stay_within_the_picture() {
-        let grey = |side: u32| Image { width_px: side, height_px: side, rgba: vec![128; 4 * (side * side) as usize] };
+        let grey =
+            |side: u32| Image { width_px: side, height_px: side, rgba: vec![128; 4 * (side * side) as usize].into() };
         let mut image = grey(64);
         draw_marks(&mut image, &[Mark::Line([[10.5, 20.0], [40.5, 20.0]]), Mark::Dot([50.5, 50.5])]);
         for (at, expected) in

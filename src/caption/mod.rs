@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn a_text_is_dark_on_light_and_light_on_dark() {
         for (ground, expected) in [([255; 4], DARK), ([0; 4], DARK), ([10, 10, 10, 255], LIGHT)] {
-            let mut image = Image { width_px: 60, height_px: 40, rgba: ground.repeat(60 * 40) };
+            let mut image = Image { width_px: 60, height_px: 40, rgba: ground.repeat(60 * 40).into() };
             write(&mut image, [4, 27], 1, "front");
             let written = image.rgba.chunks(4).filter(|pixel| *pixel != ground);
             assert!(written.clone().count() > 30 && written.into_iter().all(|pixel| pixel[..3] == expected));

@@ -193,7 +193,7 @@ mod tests {
                 let image = gradient(alpha);
                 let decoded = guess(&super::encode(&image, format, effort, &Deadline::default()).unwrap());
                 assert_eq!(decoded.color().has_alpha(), alpha != 255, "{format:?} {alpha} {effort}");
-                assert_eq!(decoded.to_rgba8().into_raw(), image.rgba, "{format:?} {alpha} {effort}");
+                assert_eq!(decoded.to_rgba8().into_raw(), *image.rgba, "{format:?} {alpha} {effort}");
             }
         }
     }
@@ -217,7 +217,7 @@ mod tests {
     /// WebP is missing here: its encoder writes when it has finished.
     #[test]
     fn a_deadline_stops_png_and_jpeg() {
-        let image = Image { width_px: 512, height_px: 512, rgba: vec![255; 512 * 512 * 4] };
+        let image = Image { width_px: 512, height_px: 512, rgba: vec![255; 512 * 512 * 4].into() };
         // PNG of a low effort is encoded while it is drawn, or soon.
         for (format, effort) in [(ImageFormat::Png, 9), (ImageFormat::Jpeg, 3)] {
             let counting = Deadline::after_polls(u64::MAX);
@@ -233,7 +233,7 @@ mod tests {
     fn one_pixel_and_one_row_encode() {
         for (width_px, height_px) in [(1, 1), (4096, 1), (1, 4096)] {
             for format in FORMATS {
-                let image = Image { width_px, height_px, rgba: vec![9; (width_px * height_px * 4) as usize] };
+                let image = Image { width_px, height_px, rgba: vec![9; (width_px * height_px * 4) as usize].into() };
                 let decoded = guess(&encode(&image, format).unwrap());
                 assert_eq!((decoded.width(), decoded.height()), (width_px, height_px));
             }

@@ -101,7 +101,7 @@ impl Canvas {
         let [width_px, height_px] = layout.size_px;
         let pixels = u64::from(width_px) * u64::from(height_px);
         budget.spend("the sheet", pixels, 4)?;
-        Ok(Self { image: Image { width_px, height_px, rgba: vec![0; pixels as usize * 4] } })
+        Ok(Self { image: Image { width_px, height_px, rgba: vec![0; pixels as usize * 4].into() } })
     }
 
     /// Puts a picture of the cell's size into it.

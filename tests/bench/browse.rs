@@ -122,7 +122,7 @@ fn turning(options: &Options, meshes: &[Vec<u8>]) -> ExitCode {
     let views = views(options, &address, meshes);
     let picture = image::load_from_memory(&get(&mut None, &address, &views[0].path).body).expect("a picture");
     let (width_px, height_px) = (picture.width(), picture.height());
-    let picture = Image { width_px, height_px, rgba: picture.into_rgba8().into_raw() };
+    let picture = Image { width_px, height_px, rgba: picture.into_rgba8().into_raw().into() };
     let (mut rates, mut encoded, mut all, mut memory_max) = (Vec::new(), Vec::new(), Seen::default(), 0);
     for turn in 0..TURNS {
         let is_over = AtomicBool::new(false);

@@ -3,6 +3,7 @@
 //!
 //!     cargo bench --bench gpu                              # bumpy tori of 70 k and 1 M triangles, 512 px
 //!     cargo bench --bench gpu -- --mesh bunny.obj --look flat --size 256 --workers 16 --rounds 200
+//!     cargo bench --bench gpu -- --copy yes                # with a copy of each picture, as if none were read in place
 
 // A tool for developers: giving up loudly is fine.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -11,6 +12,7 @@
 #[path = "stages/meshes.rs"]
 mod meshes;
 
+use std::hint::black_box;
 use std::sync::Arc;
 use std::thread;
 use std::time::Instant;
@@ -29,7 +31,7 @@ use meshsnap::spec::BackendChoice;
 const LOOKS: [&str; 4] = ["flat", "auto", "wire", "outline"];
 
 fn main() {
-    let (mut file, mut size, mut workers, mut rounds) = (None, "512".to_owned(), 1, 60_usize);
+    let (mut file, mut size, mut workers, mut rounds, mut copies) = (None, "512".to_owned(), 1, 60_usize, false);
     let mut looks = LOOKS.map(str::to_owned).to_vec();
     let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
     while let Some(name) = arguments.next() {
@@ -39,6 +41,7 @@ fn main() {
             "--size" => size = value,
             "--workers" => workers = value.parse().expect("a number"),
             "--look" => looks = vec![value],
+            "--copy" => copies = value == "yes",
             "--rounds" => rounds = value.parse().expect("a number"),
             other => panic!("there is no option {other}"),
         }
@@ -56,7 +59,7 @@ fn main() {
     for file in files {
         let mesh = read(&file);
         for look in &looks {
-            measure(&gpu, (&file.name, &mesh), (look, &size), workers, rounds.max(1));
+            measure(&gpu, (&file.name, &mesh), (look, &size), (workers, rounds.max(1)), copies);
         }
     }
 }
@@ -72,7 +75,13 @@ fn read(file: &MeshFile) -> Mesh {
 }
 
 /// Draws one look of a mesh `rounds` times on each worker, and prints a line.
-fn measure(gpu: &Arc<Gpu>, (name, mesh): (&str, &Mesh), (look, size): (&str, &str), workers: usize, rounds: usize) {
+fn measure(
+    gpu: &Arc<Gpu>,
+    (name, mesh): (&str, &Mesh),
+    (look, size): (&str, &str),
+    (workers, rounds): (usize, usize),
+    copies: bool,
+) {
     let limits = Limits { memory_bytes: 16 << 30, ..Limits::default() };
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
     let keys =
@@ -83,7 +92,12 @@ fn measure(gpu: &Arc<Gpu>, (name, mesh): (&str, &Mesh), (look, size): (&str, &st
     let plan = plan::build_from(&scene, &prepared, &mut budget, &deadline).unwrap();
     let draw = |renderer: &mut GpuRenderer| {
         let began = Instant::now();
-        renderer.draw(&plan, &deadline).unwrap();
+        let image = renderer.draw(&plan, &deadline).unwrap();
+        // As an encoder does.
+        black_box(image.is_opaque());
+        if copies {
+            black_box(image.rgba.to_vec());
+        }
         ms(began)
     };
     let first = draw(&mut GpuRenderer::new(gpu.clone()));

@@ -232,7 +232,7 @@ impl CpuRenderer {
             }
         })?;
         drop(queue);
-        Ok(Image { width_px: plan.width_px, height_px: plan.height_px, rgba })
+        Ok(Image { width_px: plan.width_px, height_px: plan.height_px, rgba: rgba.into() })
     }
 
     /// Draws the samples of all bands, and finds what light their pixels go without.

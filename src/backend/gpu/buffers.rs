@@ -76,7 +76,7 @@ pub struct Buffers {
     pub known_batches: Vec<Batch>,
     /// The last job's uniforms of a plan and of the dispatches, and what binds them.
     pub uniforms: Option<(wgpu::Buffer, wgpu::Buffer, wgpu::BindGroup)>,
-    /// Buffer from which the CPU reads results.
+    /// Buffer from which the CPU reads results. A picture takes it along.
     pub staging: Option<wgpu::Buffer>,
     /// Buffer from which the CPU reads the work list's length.
     counts: Option<wgpu::Buffer>,
@@ -203,6 +203,9 @@ impl Buffers {
             return Err(DrawError::Device(format!("the picture has {size} bytes, and the GPU's limit is {limit}")));
         }
         let written = if gpu.maps_storage { U::STORAGE } else { U::empty() };
+        if self.staging.is_none() {
+            self.staging = gpu.spare_stagings.take(size);
+        }
         Ok(grow(gpu, &mut self.staging, size, limit, U::MAP_READ | U::COPY_DST | written))
     }
 

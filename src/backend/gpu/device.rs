@@ -135,7 +135,7 @@ impl Gpu {
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
         let info = GpuInfo { name: info.name, driver, device_type: type_name(info.device_type), features };
         Ok(Self {
-            handles: Handles { device, queue, limits, maps_storage },
+            handles: Handles { device, queue, limits, maps_storage, spare_stagings: Arc::default() },
             pipelines: Pipelines::kept_in(file),
             spare_buffers: SpareBuffers::default(),
             residents: ResidentBuffers::new(if is_software { RESIDENT_BYTES_SOFTWARE } else { RESIDENT_BYTES }),
@@ -170,7 +170,7 @@ impl Gpu {
     /// Memory on the device for the buffers of jobs, kept for the next ones, bytes. None is kept without a
     /// renderer.
     pub fn spare_bytes(&self) -> u64 {
-        self.spare_buffers.bytes()
+        self.spare_buffers.bytes() + self.handles.spare_stagings.bytes()
     }
 
     /// Counts a job.
@@ -206,6 +206,7 @@ impl Gpu {
     pub(super) fn renderer_dropped(&self) {
         if self.renderers.fetch_sub(1, Ordering::AcqRel) == 1 {
             self.spare_buffers.clear();
+            self.handles.spare_stagings.clear();
         }
     }
 
@@ -307,6 +308,23 @@ impl Gpu {
             }
         }
         Err(self.declare_lost("it did not answer for two minutes"))
+    }
+
+    /// Waits until the device has written to a buffer, and maps the first `size` bytes of it.
+    pub(super) fn map(
+        &self,
+        buffer: &wgpu::Buffer,
+        size: u64,
+        deadline: &Deadline,
+    ) -> Result<wgpu::BufferView, DrawError> {
+        let (sender, mapped) = mpsc::channel();
+        buffer.map_async(wgpu::MapMode::Read, 0..size, move |result| {
+            // A job that has given up has dropped the receiver.
+            let _ = sender.send(result);
+        });
+        let mapped = self.wait(&mapped, deadline)?;
+        mapped.map_err(|error| DrawError::Device(format!("reading the picture back failed: {error}")))?;
+        buffer.get_mapped_range(0..size).map_err(|e| DrawError::Device(e.to_string()))
     }
 
     /// Runs the callbacks that are due, unless another thread is at it: its polls run ours too, and many

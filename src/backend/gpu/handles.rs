@@ -1,5 +1,9 @@
 //! Device, queue and limits of an opened GPU, in a file of their own because buffers need no more.
 
+use std::sync::Arc;
+
+use super::staging::SpareStagings;
+
 /// Device, queue and limits of an opened GPU.
 pub struct Handles {
     pub device: wgpu::Device,
@@ -7,4 +11,6 @@ pub struct Handles {
     pub limits: wgpu::Limits,
     /// True if kernels can write to a buffer that the CPU reads, and read one that it writes.
     pub maps_storage: bool,
+    /// Buffers for the next pictures.
+    pub spare_stagings: Arc<SpareStagings>,
 }

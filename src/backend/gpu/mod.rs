@@ -3,7 +3,7 @@
 //! In reading order: `device` opens a GPU; `schedule` computes the dispatches for a plan;
 //! `recorder` turns them into commands; `pipelines` holds each kernel's source, bindings and
 //! specialisation; `stage_clock` times the stages; `params` holds the uniforms, `buffers` a job's memory,
-//! `residents` what stays in memory for the next job, `gang` the jobs that share dispatches, `pass_mask` the passes over triangles. `displays` keeps
+//! `staging` the buffers that pictures are read from, `residents` what stays in memory for the next job, `gang` the jobs that share dispatches, `pass_mask` the passes over triangles. `displays` keeps
 //! drivers from looking for a window system.
 //!
 //! **Invariant:** a job uses the device on one thread only, because wgpu's error scopes belong to a
@@ -21,6 +21,7 @@ mod recorder;
 mod residents;
 pub(super) mod schedule;
 mod stage_clock;
+mod staging;
 
 use std::sync::Arc;
 
@@ -43,8 +44,9 @@ use self::schedule::sizes::{
 };
 use self::schedule::step::{Band, Goal, Step};
 use self::stage_clock::StageClock;
+use self::staging::Mapped;
 use super::{BackendKind, DrawError, DrawTimes, Renderer};
-use crate::image::{Image, srgb8_thresholds};
+use crate::image::{Image, Pixels, srgb8_thresholds};
 use crate::limits::Deadline;
 use crate::plan::{CornerValues, DrawPlan, HullVertex, SurfacePass};
 
@@ -191,7 +193,7 @@ impl GpuRenderer {
         deadline.check()?;
         let row_bytes = u64::from(plan.width_px) * 4;
         let size = row_bytes * u64::from(plan.height_px);
-        let image = Image { width_px: plan.width_px, height_px: plan.height_px, rgba: Vec::new() };
+        let image = Image { width_px: plan.width_px, height_px: plan.height_px, rgba: Vec::new().into() };
         if size == 0 {
             return Ok(image);
         }
@@ -209,13 +211,13 @@ impl GpuRenderer {
         Ok(Image { rgba, ..image })
     }
 
-    /// The bytes of a picture, drawn with buffers of its own, and the times of its stages if they are asked for.
+    /// A picture's pixels, drawn with buffers of its own, and the times of its stages if they are asked for.
     fn draw_alone(
         &self,
         plan: &DrawPlan<'_>,
         deadline: &Deadline,
         is_timed: bool,
-    ) -> Result<(Vec<u8>, DrawTimes), DrawError> {
+    ) -> Result<(Pixels, DrawTimes), DrawError> {
         let row_bytes = u64::from(plan.width_px) * 4;
         let size = row_bytes * u64::from(plan.height_px);
         let times_at = size.next_multiple_of(8);
@@ -248,14 +250,10 @@ impl GpuRenderer {
                 }
                 recorder.submit()
             })?;
-            let (mut rgba, mut stamps) = (Vec::new(), Vec::new());
             let read = if is_timed { times_at + StageClock::BYTES } else { times_at };
-            recorder.read_staging(read, |bytes| {
-                let (picture, after) = bytes.split_at(times_at as usize);
-                rgba = picture[..size as usize].to_vec();
-                stamps = after.to_vec();
-            })?;
-            Ok((rgba, recorder.times(&stamps)))
+            let mapped = Arc::new(recorder.take_staging(read)?);
+            let times = recorder.times(&mapped.bytes()[times_at as usize..]);
+            Ok((Mapped::pixels(&mapped, 0..size as usize), times))
         })
     }
 }
@@ -263,7 +261,7 @@ impl GpuRenderer {
 impl GpuRenderer {
     /// Draws plans in one gang, for tests that compare that with drawing them one by one. None if they cannot share
     /// dispatches.
-    pub fn draw_together(&mut self, plans: &[&DrawPlan<'_>]) -> Result<Option<Vec<Vec<u8>>>, DrawError> {
+    pub fn draw_together(&mut self, plans: &[&DrawPlan<'_>]) -> Result<Option<Vec<Pixels>>, DrawError> {
         let mut shares: Vec<Share> = Vec::new();
         for plan in plans {
             let Some((_, share)) = share_of(&self.gpu, plan)? else { return Ok(None) };
@@ -276,7 +274,7 @@ impl GpuRenderer {
             return Ok(None);
         };
         let pictures = gang::draw(&self.gpu, plans[0], &schedule, &shares)?;
-        Ok(Some((0..shares.len()).map(|job| pictures.rgba(job).to_vec()).collect()))
+        Ok(Some((0..shares.len()).map(|job| pictures.rgba(job)).collect()))
     }
 
     /// Waits for the job's turn among those that are alike. None if it is to be drawn alone, whoever else is drawn.
@@ -293,16 +291,16 @@ impl GpuRenderer {
             Turn::Drawn(drawn) => drawn,
         };
         deadline.check()?;
-        Ok(drawn.map(|(pictures, job)| Drawn::InGang(pictures.rgba(job).to_vec())))
+        Ok(drawn.map(|(pictures, job)| Drawn::InGang(pictures.rgba(job))))
     }
 }
 
 /// A job's turn, when it has come.
 enum Drawn<'a> {
-    /// The bytes of its picture.
-    InGang(Vec<u8>),
+    /// The pixels of its picture.
+    InGang(Pixels),
     /// It is to be drawn alone, before this is dropped.
-    Alone(gang::Leading<'a, Share, Arc<gang::Pictures>>),
+    Alone(gang::Leading<'a, Share, gang::Pictures>),
 }
 
 fn traits(gpu: &Gpu) -> DeviceTraits {

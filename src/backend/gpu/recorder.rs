@@ -13,6 +13,7 @@ use crate::backend::gpu::pipelines::key::pipeline_key;
 use crate::backend::gpu::pipelines::{Kernel, Pipeline, Slot, uniforms_layout};
 use crate::backend::gpu::schedule::tiles::Tiles;
 use crate::backend::gpu::stage_clock::StageClock;
+use crate::backend::gpu::staging::Mapped;
 use crate::backend::{DrawError, DrawStage, DrawTimes};
 use crate::limits::Deadline;
 use crate::plan::DrawPlan;
@@ -191,19 +192,20 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    fn read(&mut self, staging: &wgpu::Buffer, size: u64, read: impl FnOnce(&[u8])) -> Result<(), DrawError> {
+    /// Submits, waits, and takes the staging buffer away to be read: its first `size` bytes.
+    pub fn take_staging(&mut self, size: u64) -> Result<Mapped, DrawError> {
+        let staging = self.buffers.staging.take().ok_or_else(|| DrawError::Device("no memory to read".to_owned()))?;
         self.submit()?;
-        let (sender, mapped) = mpsc::channel();
-        staging.map_async(wgpu::MapMode::Read, 0..size, move |result| {
-            // A job that has given up has dropped the receiver.
-            let _ = sender.send(result);
-        });
-        let mapped = self.gpu.wait(&mapped, self.deadline)?;
-        mapped.map_err(|error| DrawError::Device(format!("reading the picture back failed: {error}")))?;
-        let view = staging.get_mapped_range(0..size).map_err(|e| DrawError::Device(e.to_string()))?;
+        let view = self.gpu.map(&staging, size, self.deadline)?;
+        Ok(Mapped::new(view, staging, &self.gpu.handles.spare_stagings))
+    }
+
+    fn read(&mut self, buffer: &wgpu::Buffer, size: u64, read: impl FnOnce(&[u8])) -> Result<(), DrawError> {
+        self.submit()?;
+        let view = self.gpu.map(buffer, size, self.deadline)?;
         read(&view);
         drop(view);
-        staging.unmap();
+        buffer.unmap();
         Ok(())
     }
 

@@ -216,7 +216,7 @@ impl<'a> Outputs<'a> {
             destination.write(name, &encode(name, &beside([sides[0], sides[1], difference]))?)?;
         }
         if let Some(Output { name, destination }) = &self.blink {
-            let frames = [sides[0].rgba.as_slice(), &sides[1].rgba].concat();
+            let frames = [&*sides[0].rgba, &*sides[1].rgba].concat().into();
             let frames = Image { width_px: sides[0].width_px, height_px: 2 * sides[0].height_px, rgba: frames };
             let bytes = encode::encode_animation(&frames, 2, format_of(name)?, EFFORT, &Deadline::default());
             destination.write(name, &bytes.map_err(|error| CliError::ours(error.to_string()))?)?;

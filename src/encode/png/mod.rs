@@ -32,8 +32,8 @@ pub fn is_quick(effort: u32) -> bool {
 fn small(image: &Image, effort: u32, deadline: &Deadline) -> Result<Vec<u8>, EncodeError> {
     let rgb = image.is_opaque().then(|| drop_alpha(&image.rgba));
     let (color, pixels) = match &rgb {
-        Some(rgb) => (ColorType::Rgb, rgb),
-        None => (ColorType::Rgba, &image.rgba),
+        Some(rgb) => (ColorType::Rgb, &**rgb),
+        None => (ColorType::Rgba, &*image.rgba),
     };
     let by = |filter| filtered_by(filter, image, color, pixels, effort, deadline);
     let (plain, adaptive) = rayon::join(|| by(Filter::NoFilter), || by(Filter::Adaptive));
@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn a_stopped_deadline_ends_a_long_effort() {
-        let image = Image { width_px: 4, height_px: 1000, rgba: vec![1; 16_000] };
+        let image = Image { width_px: 4, height_px: 1000, rgba: vec![1; 16_000].into() };
         let deadline = Deadline::after_polls(3);
         assert!(matches!(encode(&image, 9, &deadline), Err(EncodeError::Stopped(_))));
         // Each of the two files takes 16 polls; at most one more after the stop.

@@ -226,7 +226,7 @@ mod tests {
                 // Equal rows but for one byte, which is another one in each picture.
                 let mut rgba: Vec<u8> = (0..width_px * 4).map(|i| (i * 7 % 11) as u8).collect::<Vec<_>>().repeat(3);
                 rgba[(width_px * 4 + changed) as usize] ^= 5;
-                let image = Image { width_px, height_px: 3, rgba };
+                let image = Image { width_px, height_px: 3, rgba: rgba.into() };
                 for (channels, is_opaque) in [(3, true), (4, false)] {
                     let mut png = QuickPng::new([width_px, 3], is_opaque).unwrap();
                     png.compress(&image.rgba).unwrap();
@@ -243,7 +243,7 @@ mod tests {
     fn rows_that_come_early_change_no_byte() {
         let mut cases = 0;
         for transparent in [None, Some(0), Some(9), Some(19)] {
-            let mut image = Image { width_px: 9, height_px: 20, rgba: vec![255; 9 * 20 * 4] };
+            let mut image = Image { width_px: 9, height_px: 20, rgba: vec![255; 9 * 20 * 4].into() };
             for (i, byte) in image.rgba.iter_mut().enumerate().filter(|(i, _)| i % 4 < 3) {
                 *byte = (i * i % 251) as u8;
             }

@@ -141,7 +141,7 @@ fn picture_equals_the_stored_one(name: &str) {
     let stored = image::open(&path)
         .unwrap_or_else(|error| panic!("{}: {error}; MESHSNAP_GOLDEN=write stores it", path.display()))
         .into_rgba8();
-    let stored = Image { width_px: stored.width(), height_px: stored.height(), rgba: stored.into_raw() };
+    let stored = Image { width_px: stored.width(), height_px: stored.height(), rgba: stored.into_raw().into() };
     for isa in isas() {
         for threads in THREADS {
             let mut renderer = CpuRenderer::with_isa(threads, isa);
@@ -192,7 +192,7 @@ fn save(path: &Path, picture: &Image) {
 
 #[test]
 fn a_differing_picture_leaves_three_files() {
-    let image = |byte: u8| Image { width_px: 2, height_px: 1, rgba: vec![byte, 0, 0, 255, 9, 9, 9, 255] };
+    let image = |byte: u8| Image { width_px: 2, height_px: 1, rgba: vec![byte, 0, 0, 255, 9, 9, 9, 255].into() };
     let failed = std::panic::catch_unwind(|| assert_same("self-test", "none", &image(1), &image(2)));
     let message = failed.unwrap_err();
     assert!(message.downcast_ref::<String>().unwrap().contains("1 pixels"));

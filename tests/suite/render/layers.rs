@@ -280,13 +280,13 @@ fn sorted(plan: &DrawPlan<'_>) -> (Image, usize) {
     });
     let blended: Vec<[f64; 3]> = blended.collect();
     let thresholds = srgb8_thresholds();
-    let mut image = Image { width_px: plan.width_px, height_px: plan.height_px, rgba: Vec::new() };
+    let mut rgba = Vec::new();
     for pixel in blended.chunks(plan.samples as usize) {
         for k in 0..3 {
             let mean = pixel.iter().map(|c| c[k]).sum::<f64>() / f64::from(plan.samples);
-            image.rgba.push(thresholds.iter().filter(|&&t| f64::from(t) <= mean).count() as u8);
+            rgba.push(thresholds.iter().filter(|&&t| f64::from(t) <= mean).count() as u8);
         }
-        image.rgba.push(255);
+        rgba.push(255);
     }
-    (image, deepest)
+    (Image { width_px: plan.width_px, height_px: plan.height_px, rgba: rgba.into() }, deepest)
 }

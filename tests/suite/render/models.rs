@@ -112,7 +112,7 @@ impl Sheet {
         let (columns, rows) = (10, self.pictures.len().div_ceil(10) as u32);
         let mut sheet = image::RgbaImage::new(columns * SIZE_PX, rows * SIZE_PX);
         for (i, picture) in (0..).zip(&self.pictures) {
-            let tile = image::RgbaImage::from_raw(SIZE_PX, SIZE_PX, picture.rgba.clone()).unwrap();
+            let tile = image::RgbaImage::from_raw(SIZE_PX, SIZE_PX, picture.rgba.to_vec()).unwrap();
             let (x, y) = (i % columns * SIZE_PX, i / columns * SIZE_PX);
             image::imageops::replace(&mut sheet, &tile, i64::from(x), i64::from(y));
         }

@@ -81,7 +81,7 @@ fn creases_are_those_that_each_picture_asks_for() {
                     let mut budget = Budget::new(&Limits::default());
                     let scene = Scene::new(mesh, &spec, &mut budget).unwrap();
                     let plan = plan::build_from(&scene, &prepared, &mut budget, &Deadline::default()).unwrap();
-                    pictures.insert(renderer.draw(&plan, &Deadline::default()).unwrap().rgba);
+                    pictures.insert(renderer.draw(&plan, &Deadline::default()).unwrap().rgba.into_vec());
                     drawn += 1;
                 }
             }

@@ -1,6 +1,6 @@
 //! The commands that draw a gang.
 
-use std::sync::{Arc, mpsc};
+use std::sync::Arc;
 
 use super::seat::Share;
 use crate::backend::DrawError;
@@ -13,7 +13,9 @@ use crate::backend::gpu::schedule::Schedule;
 use crate::backend::gpu::schedule::sizes::{
     JOBS_MAX, OCCLUSION_BYTES, SAMPLE_BYTES, color_bytes, is_painted, work_bytes,
 };
+use crate::backend::gpu::staging::Mapped;
 use crate::backend::gpu::{upload_geometry, upload_shading};
+use crate::image::Pixels;
 use crate::limits::Deadline;
 use crate::plan::{DrawPlan, HullVertex};
 
@@ -21,53 +23,34 @@ use crate::plan::{DrawPlan, HullVertex};
 const BATCHES_STRIDE: usize = JOBS_MAX * size_of::<Batch>();
 
 /// The pictures of a gang, in memory that the CPU and the device share.
+#[derive(Clone)]
 pub struct Pictures {
-    gpu: Arc<Gpu>,
-    /// Some until it is dropped.
-    view: Option<wgpu::BufferView>,
-    /// Some until it is dropped.
-    buffers: Option<Buffers>,
+    mapped: Arc<Mapped>,
     /// The end of each picture, bytes; it begins where the one before it ends.
-    ends: Vec<usize>,
+    ends: Arc<[usize]>,
 }
 
 impl Pictures {
-    /// Bytes of the picture of a job.
-    pub fn rgba(&self, job: usize) -> &[u8] {
+    /// The pixels of the picture of a job.
+    pub fn rgba(&self, job: usize) -> Pixels {
         let begin = job.checked_sub(1).and_then(|before| self.ends.get(before)).copied().unwrap_or(0);
         let end = self.ends.get(job).copied().unwrap_or(begin);
-        self.view.as_ref().and_then(|view| view.get(begin..end)).unwrap_or_default()
-    }
-}
-
-impl Drop for Pictures {
-    fn drop(&mut self) {
-        self.view = None;
-        if let Some(buffers) = self.buffers.take() {
-            if let Some(staging) = &buffers.staging {
-                staging.unmap();
-            }
-            self.gpu.spare_buffers.give_back(buffers);
-        }
+        Mapped::pixels(&self.mapped, begin..end)
     }
 }
 
 /// Draws the pictures of all shares, the first of which is the plan's own.
-pub fn draw(
-    gpu: &Arc<Gpu>,
-    plan: &DrawPlan<'_>,
-    schedule: &Schedule,
-    shares: &[Share],
-) -> Result<Arc<Pictures>, DrawError> {
+pub fn draw(gpu: &Arc<Gpu>, plan: &DrawPlan<'_>, schedule: &Schedule, shares: &[Share]) -> Result<Pictures, DrawError> {
     gpu.check()?;
     let mut buffers = gpu.spare_buffers.take();
     let drawn = gpu.scoped(|| submit(gpu, &mut buffers, plan, schedule, shares));
     gpu.gang_drawn(shares.len());
     let filled = buffers.unbind_all();
     // After an error the buffers may still be in use.
-    let (view, ends) = drawn?;
+    let pictures = drawn?;
     filled.into_iter().for_each(|(slot, source, buffer)| gpu.residents.keep(slot, &source, buffer));
-    Ok(Arc::new(Pictures { gpu: gpu.clone(), view: Some(view), buffers: Some(buffers), ends }))
+    gpu.spare_buffers.give_back(buffers);
+    Ok(pictures)
 }
 
 /// The beginning of a job's part of each buffer; of the last, the end.
@@ -85,7 +68,7 @@ fn submit(
     plan: &DrawPlan<'_>,
     schedule: &Schedule,
     shares: &[Share],
-) -> Result<(wgpu::BufferView, Vec<usize>), DrawError> {
+) -> Result<Pictures, DrawError> {
     let key = shares.first().map_or(0, Share::key);
     let kernels = schedule.kernels();
     gpu.make_pipelines(&kernels, key)?;
@@ -123,7 +106,10 @@ fn submit(
     drop(pass);
     gpu.handles.queue.submit([encoder.finish()]);
     let size = ends.last().copied().unwrap_or(0) as u64;
-    Ok((read(gpu, buffers, size)?, ends))
+    let staging = buffers.staging.take().ok_or_else(|| DrawError::Device("no memory for pictures".to_owned()))?;
+    // No deadline ends this: a gang is many jobs', and small.
+    let view = gpu.map(&staging, size, &Deadline::default())?;
+    Ok(Pictures { mapped: Arc::new(Mapped::new(view, staging, &gpu.handles.spare_stagings)), ends: ends.into() })
 }
 
 /// Reserves what the kernels write, for all jobs.
@@ -165,16 +151,4 @@ fn uniforms(shares: &[Share]) -> (Vec<Frame>, Vec<Batch>, Vec<usize>, Starts) {
         ends.push(at.pixels as usize * 4);
     }
     (frames, batches, ends, at)
-}
-
-/// Waits for the device, and maps the pictures. No deadline ends this: a gang is many jobs', and small.
-fn read(gpu: &Gpu, buffers: &Buffers, size: u64) -> Result<wgpu::BufferView, DrawError> {
-    let staging = buffers.staging.as_ref().ok_or_else(|| DrawError::Device("no memory for pictures".to_owned()))?;
-    let (sender, mapped) = mpsc::channel();
-    staging.map_async(wgpu::MapMode::Read, 0..size, move |result| {
-        let _ = sender.send(result);
-    });
-    let mapped = gpu.wait(&mapped, &Deadline::default())?;
-    mapped.map_err(|error| DrawError::Device(format!("reading pictures back failed: {error}")))?;
-    staging.get_mapped_range(0..size).map_err(|e| DrawError::Device(e.to_string()))
 }

@@ -12,12 +12,10 @@ mod draw;
 mod seat;
 mod turns;
 
-use std::sync::Arc;
-
 pub use self::draw::{Pictures, draw};
 pub use self::seat::{Share, may_share};
 use self::turns::Turns;
 pub use self::turns::{Leading, Seat, Turn};
 
 /// The gangs of a device.
-pub type Gangs = Turns<Share, Arc<Pictures>>;
+pub type Gangs = Turns<Share, Pictures>;

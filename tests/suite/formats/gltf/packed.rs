@@ -262,7 +262,7 @@ fn every_encoding_gives_the_same_picture() {
     let mut cases = 0;
     for style in ["smooth", "wire"] {
         let plain = draw(&sheet.plain().glb(), style);
-        let blank = Image { rgba: vec![255; plain.rgba.len()], ..plain.clone() };
+        let blank = Image { rgba: vec![255; plain.rgba.len()].into(), ..plain.clone() };
         assert!(mean_difference(&plain, &blank) > 5.0, "there is something to see");
         for (i, gltf) in packed.iter().enumerate() {
             let difference = mean_difference(&plain, &draw(&gltf.glb(), style));

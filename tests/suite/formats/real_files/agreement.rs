@@ -200,7 +200,7 @@ fn totals(files: &[(String, Vec<u8>)], is_said_gltf: bool, is_drawn: bool) -> Op
 
 fn picture(answer: &Answer) -> Image {
     let picture = image::load_from_memory(&answer.body).unwrap().to_rgba8();
-    Image { width_px: picture.width(), height_px: picture.height(), rgba: picture.into_raw() }
+    Image { width_px: picture.width(), height_px: picture.height(), rgba: picture.into_raw().into() }
 }
 
 impl Row {

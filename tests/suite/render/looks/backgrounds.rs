@@ -58,7 +58,7 @@ fn draw(plan: &DrawPlan<'_>) -> Vec<u8> {
     let image = CpuRenderer::new(1).draw(plan, &Deadline::default()).unwrap();
     let other = CpuRenderer::with_isa(3, Isa::baseline()).draw(plan, &Deadline::default()).unwrap();
     assert!(image.rgba == other.rgba);
-    image.rgba
+    image.rgba.into_vec()
 }
 
 #[test]

@@ -76,7 +76,7 @@ fn first_sight_is_as_clear_as_that_of_workbench() {
         let stem = name.split('.').next().unwrap();
         let reference = image::open(references.join(format!("workbench-{stem}.png"))).unwrap().into_rgba8();
         let reference =
-            Image { width_px: reference.width(), height_px: reference.height(), rgba: reference.into_raw() };
+            Image { width_px: reference.width(), height_px: reference.height(), rgba: reference.into_raw().into() };
         let own = of_height(&mesh, height_px(&reference));
         let share = contrast(&own) / contrast(&reference);
         println!("{name:<32} local contrast {:4.2}: {share:.2} of Workbench's", contrast(&own));

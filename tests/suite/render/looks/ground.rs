@@ -82,7 +82,8 @@ fn the_plane_follows_the_up_axis_and_lies_under_the_lowest_point() {
         let (without, with) = (draw(&obj, &keys), draw(&obj, &[&keys[..], &[SHADOW]].concat()));
         let rows = |top: u32, bottom: u32| -> usize {
             let at = |y: u32| 4 * (y * with.width_px) as usize..4 * ((y + 1) * with.width_px) as usize;
-            let part = |image: &Image, y: u32| Image { width_px: 120, height_px: 1, rgba: image.rgba[at(y)].to_vec() };
+            let part =
+                |image: &Image, y: u32| Image { width_px: 120, height_px: 1, rgba: image.rgba[at(y)].to_vec().into() };
             (top..bottom).map(|y| shadow(&part(&with, y), &part(&without, y)).len()).sum()
         };
         assert_eq!(rows(0, 30), 0, "{up}");

@@ -2,6 +2,7 @@
 
 pub mod flat;
 mod gangs;
+mod lent;
 pub mod pictures;
 pub mod shade;
 pub mod visibility;

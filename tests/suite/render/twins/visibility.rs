@@ -157,7 +157,7 @@ fn plans_with_nothing_to_draw_are_background() {
             let plan = soup.plan(&view);
             let mut renderer = GpuRenderer::new(gpus[0].clone());
             let image = renderer.draw(&plan, &Deadline::default()).unwrap();
-            assert_eq!(image.rgba, vec![255; 33 * 7 * 4]);
+            assert_eq!(*image.rgba, [255; 33 * 7 * 4]);
             assert_eq!(renderer.draw_visibility(&plan, &Deadline::default()).unwrap(), vec![0; 33 * 7 * 4]);
             cases += 1;
         }
