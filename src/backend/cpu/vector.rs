@@ -107,3 +107,9 @@ pub fn facing<const N: usize>(n: &[[f32; N]; 3], front: &[bool; N]) -> [[f32; N]
     }
     out
 }
+
+/// `N` values from `first` on, a multiple of it.
+#[inline(always)]
+pub fn part<T: Copy + Default, const N: usize, const ALL: usize>(all: &[T; ALL], first: usize) -> [T; N] {
+    all.get(first..).and_then(|all| all.first_chunk()).copied().unwrap_or([T::default(); N])
+}

@@ -41,7 +41,7 @@ use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::resolve::Resolver;
 use crate::backend::cpu::surface::flat::{draw_flat, shade_flat};
 use crate::backend::cpu::surface::light::Light;
-use crate::backend::cpu::surface::shade;
+use crate::backend::cpu::surface::together;
 use crate::plan::{LinePass, OcclusionPass};
 
 /// Edges between two polls of the deadline. Wide lines count their pixels too.
@@ -251,7 +251,7 @@ dispatch! {
 
 dispatch! {
     /// The shade stage of a band.
-    pub fn shade_band(context: &RasterContext<'_>, samples: &SampleBand, colors: &mut [[f32; 4]]) = shade::shade
+    pub fn shade_band(context: &RasterContext<'_>, samples: &SampleBand, colors: &mut [[f32; 4]]) = together::shade
 }
 
 dispatch! {

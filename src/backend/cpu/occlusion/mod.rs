@@ -10,6 +10,7 @@ pub mod spread;
 use self::gather::gather_rows;
 use self::grid::Grid;
 use self::spread::spread_rows;
+use super::isa::LANES;
 use super::{RasterContext, run};
 use crate::plan::OcclusionPass;
 
@@ -61,6 +62,27 @@ impl Occlusion {
                 spread_rows(context.isa, pass, grid, gathered, first, out);
             }
         });
+    }
+
+    /// As [`Self::open_share`] for eight neighbours in a row. Those that get bits show another surface, and their shares
+    /// are not found here.
+    #[inline(always)]
+    pub fn open_shares(
+        &self,
+        pass: &OcclusionPass,
+        [x, y]: [u32; 2],
+        (z, own_z): (&[f32; LANES], &[f32; LANES]),
+        open: &mut [f32; LANES],
+    ) -> u32 {
+        let shut = self.spread.get((y * self.grid.width_px + x) as usize..).and_then(|shut| shut.first_chunk());
+        let shut: &[u8; LANES] = shut.unwrap_or(&[0; LANES]);
+        let mut far = 0;
+        for l in 0..LANES {
+            open[l] = 1.0 - (pass.strength * (1.0 / 255.0)) * f32::from(shut[l]);
+            let is_near = ((z[l] - own_z[l]).abs() <= pass.near_depth) & (own_z[l] > 0.0);
+            far |= u32::from(!is_near) << l;
+        }
+        far
     }
 
     /// The share of light that reaches a surface of depth `z` in a pixel whose first sample has the

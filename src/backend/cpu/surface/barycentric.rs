@@ -3,6 +3,7 @@
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, recip};
+use crate::backend::cpu::vector::part;
 use crate::plan::DrawPlan;
 
 /// Corners of `N` triangles, each relative to its shaded point: homogeneous (x, y, w), and the factor
@@ -39,6 +40,13 @@ impl<const N: usize> Corners<N> {
             c.replace_outside(context, ids, at);
         }
         c
+    }
+
+    /// Those of `M` triangles, from `first` on, a multiple of it.
+    #[inline(always)]
+    pub fn part<const M: usize>(&self, first: usize) -> Corners<M> {
+        let of = |all: &[[f32; N]; 3]| [part(&all[0], first), part(&all[1], first), part(&all[2], first)];
+        Corners { x: of(&self.x), y: of(&self.y), w: of(&self.w), weight: of(&self.weight) }
     }
 
     #[cold]

@@ -1,8 +1,9 @@
 //! Stage shade: from visible samples to colours.
 //!
-//! [`shade`] groups a pixel's samples by triangle, [`point`] shades each group once, at the mean of
-//! its samples; groups of neighbouring pixels are [`waiting`] until eight are shaded together. The rest is its formulas: [`barycentric`] coordinates, [`texture`] lookups, the
-//! [`normal`], [`light`], [`occlusion`], [`wire`] and [`debug`] views. Twins are in `shaders/surface/`.
+//! [`together`] groups a pixel's samples by triangle, eight pixels at a time, and [`shade`] those of a pixel by itself.
+//! [`point`] shades each group once, at the mean of its samples; groups of a band are [`waiting`] until many are
+//! shaded together. The rest is its formulas: [`barycentric`] coordinates, [`texture`] lookups, the [`normal`],
+//! [`light`], [`occlusion`], [`wire`] and [`debug`] views. Twins are in `shaders/surface/`.
 
 pub(crate) mod barycentric;
 pub(crate) mod debug;
@@ -15,5 +16,6 @@ mod occlusion;
 pub(crate) mod point;
 pub(crate) mod shade;
 pub(crate) mod texture;
+pub(crate) mod together;
 pub mod waiting;
 pub(crate) mod wire;

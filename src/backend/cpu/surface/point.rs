@@ -119,31 +119,54 @@ impl Points<'_> {
     #[inline(always)]
     fn common<const N: usize>(&self, ids: &[u32; N], at: &[[f32; N]; 2], open: &[f32; N]) -> [[f32; N]; 4] {
         let Self { context, surface, material, show } = self;
-        let b = Barycentrics::new(&Corners::new(context, ids, at));
-        let base = with_alpha(material, material.base_color, *show);
-        let projection = &context.plan.projection;
-        let (metallic, roughness) = ([material.metallic; N], [material.roughness; N]);
-        let light = if material.flags & flags::LIT == 0 {
-            LightLanes::NONE
-        } else if let (Some(normals), true) = (&surface.vertex_normals, material.flags & flags::VERTEX_NORMALS != 0) {
-            let normal = facing(&blend(&of_corners(normals, ids), &b.value), &b.front);
-            light_lanes(|w| 1.0 / w, &surface.lights, projection, &metallic, &roughness, &normal)
-        } else {
-            let has_normals = ids.iter().all(|id| (*id as usize) < surface.face_normals.len());
-            let normal = if has_normals { face_normals(surface, ids, &b.front) } else { to_viewer(projection) };
-            light_lanes(quick_recip, &surface.lights, projection, &metallic, &roughness, &normal)
+        let corners = Corners::new(context, ids, at);
+        let color = match &surface.vertex_normals {
+            Some(normals) if material.flags & flags::VERTEX_NORMALS != 0 => {
+                self.smooth(&corners, &of_corners(normals, ids), open)
+            }
+            _ => self.even(ids, &Barycentrics::new(&corners).front, open),
         };
-        let emissive = material.emissive.map(|v| [v; N]);
-        let base = base.map(|v| [v; N]);
-        let is_lit = material.flags & flags::LIT != 0;
-        let shown = if is_lit { lit_lanes(&base, &light.dimmed(open)) } else { unlit_lanes(&base) };
-        let color = premultiplied(&shown, &emissive);
         if material.flags & flags::WIRE_FWIDTH == 0 || show.wires == 0.0 {
             return color;
         }
         let masks = ids.map(|id| edge_mask(surface, id));
-        let covers = fwidth_covers(&masks, material, &b).map(|cover| show.wires * cover);
+        let covers = fwidth_covers(&masks, material, &Barycentrics::new(&corners)).map(|cover| show.wires * cover);
         over(&covers, material.wire_color, &color)
+    }
+
+    /// One base colour under light by the normals of the triangles' corners.
+    #[inline(always)]
+    pub fn smooth<const N: usize>(
+        &self,
+        corners: &Corners<N>,
+        normals: &[[[f32; N]; 3]; 3],
+        open: &[f32; N],
+    ) -> [[f32; N]; 4] {
+        let Self { context, surface, material, show } = self;
+        let b = Barycentrics::new(corners);
+        let normal = facing(&blend(normals, &b.value), &b.front);
+        let (metallic, roughness) = ([material.metallic; N], [material.roughness; N]);
+        let projection = &context.plan.projection;
+        let light = light_lanes(|w| 1.0 / w, &surface.lights, projection, &metallic, &roughness, &normal);
+        let base = with_alpha(material, material.base_color, *show).map(|v| [v; N]);
+        premultiplied(&lit_lanes(&base, &light.dimmed(open)), &material.emissive.map(|v| [v; N]))
+    }
+
+    /// One base colour, with light by the triangles' own normals or none.
+    #[inline(always)]
+    fn even<const N: usize>(&self, ids: &[u32; N], front: &[bool; N], open: &[f32; N]) -> [[f32; N]; 4] {
+        let Self { context, surface, material, show } = self;
+        let base = with_alpha(material, material.base_color, *show).map(|v| [v; N]);
+        let emissive = material.emissive.map(|v| [v; N]);
+        if material.flags & flags::LIT == 0 {
+            return premultiplied(&unlit_lanes(&base), &emissive);
+        }
+        let projection = &context.plan.projection;
+        let has_normals = ids.iter().all(|id| (*id as usize) < surface.face_normals.len());
+        let normal = if has_normals { face_normals(surface, ids, front) } else { to_viewer(projection) };
+        let (metallic, roughness) = ([material.metallic; N], [material.roughness; N]);
+        let light = light_lanes(quick_recip, &surface.lights, projection, &metallic, &roughness, &normal);
+        premultiplied(&lit_lanes(&base, &light.dimmed(open)), &emissive)
     }
 
     /// Every material there is, but for debug views.
@@ -315,6 +338,11 @@ impl Points<'_> {
 
 fn is_textured(surface: &SurfacePass<'_>, material: &ShadedMaterial) -> bool {
     !surface.textures.images.is_empty() && material.textures.iter().any(|used| used.texture != TEXTURE_NONE)
+}
+
+/// True if a material has one base colour under light by the normals of the triangles' corners, and nothing else.
+pub fn is_smooth(surface: &SurfacePass<'_>, material: &ShadedMaterial) -> bool {
+    material.flags & (GENERAL | VARYING) == flags::VERTEX_NORMALS && !is_textured(surface, material)
 }
 
 /// True if a material's colour is the same all over a triangle.

@@ -5,36 +5,10 @@
 //! ([`point`](super::point)), and weigh their share.
 
 use super::point::{PointShader, Show};
-use super::waiting::{Point, Waiting};
 use crate::backend::cpu::RasterContext;
-use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
+use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::recip;
-use crate::backend::cpu::isa::LANES;
-use crate::plan::{SurfacePass, sample_offsets};
-
-/// Shades every pixel of the band into `colors` (premultiplied linear RGBA, row by row, nothing
-/// behind it).
-#[inline(always)]
-pub fn shade(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
-    for_samples!(band.samples, shade_sampled(context, band, colors));
-}
-
-#[inline(always)]
-fn shade_sampled<const S: usize>(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
-    let width = band.size_px[0] as usize;
-    let mut shader = Shader::new(context);
-    let surface = context.plan.surface.as_ref().filter(|surface| surface.is_shaded && !context.is_plain);
-    for (y, row) in (band.shown[0]..band.shown[1]).zip(colors.chunks_exact_mut(width)) {
-        match surface {
-            Some(surface) => shader.row_together::<S>(surface, band, y, row),
-            None => {
-                for (x, color) in (0_u32..).zip(row) {
-                    *color = shader.pixel::<S>(band, x, y);
-                }
-            }
-        }
-    }
-}
+use crate::plan::sample_offsets;
 
 /// Shades pixels of a band.
 pub struct Shader<'a> {
@@ -50,49 +24,6 @@ impl<'a> Shader<'a> {
         Self { context, points: PointShader::new(context) }
     }
 
-    /// Shades a row of the picture, eight points at a time. Each pixel sums up what its triangles add
-    /// in the order of [`mixed_pixel`](Self::mixed_pixel).
-    #[inline(always)]
-    fn row_together<const S: usize>(
-        &mut self,
-        surface: &SurfacePass<'_>,
-        band: &SampleBand,
-        y: u32,
-        row: &mut [[f32; 4]],
-    ) {
-        row.fill([0.0; 4]);
-        let triangles = self.context.plan.triangles.len() as u32;
-        let first = band.index(0, y as i32, 0);
-        let (pixels, _) = band.ids[first..first + row.len() * S].as_chunks::<S>();
-        let mut waiting = Waiting::new(self.context, surface);
-        let is_dimmed = self.context.occlusion.is_some();
-        for (group, pixels) in (0_u32..).zip(pixels.chunks(LANES)) {
-            if pixels.as_flattened().iter().fold(0, |any, id| any | (id ^ NOTHING)) == 0 {
-                continue;
-            }
-            for (x, ids) in (LANES as u32 * group..).zip(pixels) {
-                if ids.iter().any(|&id| id >= triangles && id != NOTHING) {
-                    row[x as usize] = self.pixel::<S>(band, x, y);
-                    continue;
-                }
-                let open = |s: usize| {
-                    let depths = if is_dimmed { &band.depth[first + S * x as usize..] } else { return 1.0 };
-                    self.open_share([x, y], depths[s], depths[0])
-                };
-                if ids[0] != NOTHING && ids.iter().all(|&id| id == ids[0]) {
-                    let at = self.mean_place([x, y], [128 * S as i32; 2], S as i32);
-                    waiting.push(Point { id: ids[0], at, weight: 1.0, pixel: x, open: open(0) }, row);
-                    continue;
-                }
-                for_each_triangle(ids, |id, s, offset, count| {
-                    let (at, weight) = (self.mean_place([x, y], offset, count), count as f32 / S as f32);
-                    waiting.push(Point { id, at, weight, pixel: x, open: open(s) }, row);
-                });
-            }
-        }
-        waiting.shade(row);
-    }
-
     /// The share of light that reaches a surface of depth `z` in a pixel whose first sample has the depth
     /// `own_z`.
     #[inline(always)]
@@ -103,10 +34,9 @@ impl<'a> Shader<'a> {
     /// The mean of `count` samples of a pixel, whose offsets in 1/256 px add up to `offset_sum`: in 1/256
     /// px from the picture's centre.
     #[inline(always)]
-    fn mean_place(&self, [x, y]: [u32; 2], offset_sum: [i32; 2], count: i32) -> [f32; 2] {
-        let plan = self.context.plan;
+    pub(super) fn mean_place(&self, [x, y]: [u32; 2], offset_sum: [i32; 2], count: i32) -> [f32; 2] {
         let scale = recip(count as f32);
-        let corner = [x as i32 * 256 - plan.width_px as i32 * 128, y as i32 * 256 - plan.height_px as i32 * 128];
+        let corner = self.context.corner_of([x, y]);
         [corner[0] as f32 + offset_sum[0] as f32 * scale, corner[1] as f32 + offset_sum[1] as f32 * scale]
     }
 
@@ -198,7 +128,7 @@ impl<'a> Shader<'a> {
 /// Calls `each` with every triangle among a pixel's samples: its id, the number of its first sample, the
 /// sum of its samples' offsets in 1/256 px, and how many they are.
 #[inline(always)]
-fn for_each_triangle<const S: usize>(ids: &[u32; S], mut each: impl FnMut(u32, usize, [i32; 2], i32)) {
+pub(super) fn for_each_triangle<const S: usize>(ids: &[u32; S], mut each: impl FnMut(u32, usize, [i32; 2], i32)) {
     let offsets = sample_offsets(S as u32);
     for s in 0..S {
         if ids[s] == NOTHING || ids[..s].contains(&ids[s]) {

@@ -1,9 +1,16 @@
-//! Stage shade: points of a row wait until there are eight of one material, and are shaded together.
+//! Stage shade: points of a band wait until there are many of one material, and are shaded together.
 
-use super::point::{Points, Show};
+use super::barycentric::Corners;
+use super::point::{Points, Show, is_smooth};
+use super::texture::of_corners;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::isa::{LANES, dispatch};
+use crate::backend::cpu::vector::part;
 use crate::plan::SurfacePass;
+
+/// Points that are shaded together, at most. The corners of so many are read in one go, so that the processor waits for
+/// many of them at a time.
+pub const BLOCK: usize = 32;
 
 /// Points that wait to be shaded, of triangles of one material.
 pub struct Waiting<'a> {
@@ -11,7 +18,7 @@ pub struct Waiting<'a> {
     surface: &'a SurfacePass<'a>,
     /// Index of the material.
     material: u32,
-    points: Points8,
+    points: PointBlock,
 }
 
 /// A point of a triangle, for which a pixel is shaded.
@@ -22,38 +29,38 @@ pub struct Point {
     pub at: [f32; 2],
     /// The triangle's share of the pixel, 0 to 1.
     pub weight: f32,
-    /// Index of the pixel in its row.
+    /// Index of the pixel among the colours that are passed.
     pub pixel: u32,
     /// Share of the light that reaches it, 0 to 1.
     pub open: f32,
 }
 
-/// Up to eight [`Point`]s, a vector for each field. Vectors hold earlier points from `len` on.
+/// Up to [`BLOCK`] [`Point`]s, a list for each field. Lists hold earlier points from `len` on.
 #[derive(Default)]
-pub struct Points8 {
+pub struct PointBlock {
     len: usize,
-    ids: [u32; LANES],
-    at: [[f32; LANES]; 2],
-    weights: [f32; LANES],
-    pixels: [u32; LANES],
-    open: [f32; LANES],
+    ids: [u32; BLOCK],
+    at: [[f32; BLOCK]; 2],
+    weights: [f32; BLOCK],
+    pixels: [u32; BLOCK],
+    open: [f32; BLOCK],
 }
 
 impl<'a> Waiting<'a> {
     /// None yet.
     pub fn new(context: &'a RasterContext<'a>, surface: &'a SurfacePass<'a>) -> Self {
-        Self { context, surface, material: 0, points: Points8::default() }
+        Self { context, surface, material: 0, points: PointBlock::default() }
     }
 
-    /// Adds a point. Shades those that wait if there are eight, or if its material is another.
+    /// Adds a point. Shades those that wait if there are as many as can be, or if its material is another.
     #[inline(always)]
-    pub fn push(&mut self, point: Point, row: &mut [[f32; 4]]) {
+    pub fn push(&mut self, point: Point, colors: &mut [[f32; 4]]) {
         let material = self.surface.triangle_materials.get(point.id as usize).map_or(0, |&material| material);
-        if self.points.len == LANES || material != self.material {
-            self.shade(row);
+        if self.points.len == BLOCK || material != self.material {
+            self.shade(colors);
             self.material = material;
         }
-        let l = self.points.len % LANES;
+        let l = self.points.len % BLOCK;
         let points = &mut self.points;
         points.ids[l] = point.id;
         (points.at[0][l], points.at[1][l]) = (point.at[0], point.at[1]);
@@ -61,31 +68,63 @@ impl<'a> Waiting<'a> {
         points.len = l + 1;
     }
 
-    /// Shades the points that wait, and adds their shares to the pixels of their row, in the order in
+    /// Shades the points that wait, and adds their shares to the colours of their pixels, in the order in
     /// which they came.
     #[inline(always)]
-    pub fn shade(&mut self, row: &mut [[f32; 4]]) {
+    pub fn shade(&mut self, colors: &mut [[f32; 4]]) {
         if self.points.len > 0 {
-            shade_points(self.context.isa, self.context, self.surface, &self.points, row);
+            shade_points(self.context.isa, self.context, self.surface, &self.points, colors);
             self.points.len = 0;
         }
     }
 }
 
 dispatch! {
-    /// Shades up to eight points of triangles of one material, and adds their shares to pixels.
-    pub fn shade_points(context: &RasterContext<'_>, surface: &SurfacePass<'_>, points: &Points8, row: &mut [[f32; 4]]) = shade_kernel
+    /// Shades points of triangles of one material, and adds their shares to pixels.
+    pub fn shade_points(
+        context: &RasterContext<'_>,
+        surface: &SurfacePass<'_>,
+        points: &PointBlock,
+        colors: &mut [[f32; 4]],
+    ) = shade_kernel
 }
 
 #[inline(always)]
-fn shade_kernel(context: &RasterContext<'_>, surface: &SurfacePass<'_>, points: &Points8, row: &mut [[f32; 4]]) {
-    let Points8 { len, ids, at, weights, pixels, open } = points;
-    let material = surface.material(ids[0] as usize);
-    let colors = Points { context, surface, material, show: Show::ALL }.colors(ids, at, open);
-    for l in 0..(*len).min(LANES) {
-        if let Some(pixel) = row.get_mut(pixels[l] as usize) {
-            for k in 0..4 {
-                pixel[k] += weights[l] * colors[k][l];
+fn shade_kernel(context: &RasterContext<'_>, surface: &SurfacePass<'_>, points: &PointBlock, colors: &mut [[f32; 4]]) {
+    let material = surface.material(points.ids[0] as usize);
+    let shader = Points { context, surface, material, show: Show::ALL };
+    let groups = (0..points.len.min(BLOCK)).step_by(LANES);
+    match &surface.vertex_normals {
+        Some(normals) if is_smooth(surface, material) => {
+            let corners = Corners::new(context, &points.ids, &points.at);
+            let normals = of_corners(normals, &points.ids);
+            for first in groups {
+                let mut own = [[[0.0; LANES]; 3]; 3];
+                for (own, all) in own.as_flattened_mut().iter_mut().zip(normals.as_flattened()) {
+                    *own = part(all, first);
+                }
+                points.add(first, &shader.smooth(&corners.part(first), &own, &part(&points.open, first)), colors);
+            }
+        }
+        _ => {
+            for first in groups {
+                let at = [part(&points.at[0], first), part(&points.at[1], first)];
+                points.add(first, &shader.colors(&part(&points.ids, first), &at, &part(&points.open, first)), colors);
+            }
+        }
+    }
+}
+
+impl PointBlock {
+    /// Adds the colours of points from `first` on to those of their pixels.
+    #[inline(always)]
+    fn add(&self, first: usize, shaded: &[[f32; LANES]; 4], colors: &mut [[f32; 4]]) {
+        let (weights, pixels): ([f32; LANES], [u32; LANES]) = (part(&self.weights, first), part(&self.pixels, first));
+        for l in 0..LANES.min(self.len - first) {
+            if let Some(pixel) = colors.get_mut(pixels[l] as usize) {
+                for k in 0..4 {
+                    pixel[k] += weights[l] * shaded[k][l];
+                }
             }
         }
     }
