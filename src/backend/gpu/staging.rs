@@ -16,10 +16,11 @@ const KEPT_BYTES_MAX: u64 = 256 << 20;
 pub struct SpareStagings(Mutex<Vec<wgpu::Buffer>>);
 
 impl SpareStagings {
-    /// The buffer given back last that has at least `size` bytes.
+    /// The smallest buffer of at least `size` bytes.
     pub fn take(&self, size: u64) -> Option<wgpu::Buffer> {
         let mut spare = self.lock();
-        let at = spare.iter().rposition(|buffer| buffer.size() >= size)?;
+        let fits = spare.iter().enumerate().filter(|(_, buffer)| buffer.size() >= size);
+        let (at, _) = fits.min_by_key(|(_, buffer)| buffer.size())?;
         Some(spare.remove(at))
     }
 
