@@ -16,13 +16,13 @@ pub struct Image {
     pub rgba: Pixels,
 }
 
-/// The bytes of a picture. They may lie in memory that a GPU has written and that other pictures get afterwards: then
-/// encoders read them in place, and only what changes or keeps them makes a copy.
+/// The bytes of a picture. They may lie in memory that a GPU has written: then encoders read them in place, and the
+/// picture holds that memory until it and its clones are dropped. [`into_vec`](Pixels::into_vec), and writing, make a copy.
 #[derive(Clone)]
 pub struct Pixels(Memory);
 
 /// Memory that holds the bytes of a picture until it is dropped.
-pub(crate) trait LentMemory: Send + Sync {
+pub(crate) trait SharedMemory: Send + Sync {
     /// The bytes.
     fn bytes(&self) -> &[u8];
 }
@@ -30,21 +30,21 @@ pub(crate) trait LentMemory: Send + Sync {
 #[derive(Clone)]
 enum Memory {
     Own(Vec<u8>),
-    Lent(Arc<dyn LentMemory>),
+    Shared(Arc<dyn SharedMemory>),
 }
 
 impl Pixels {
     /// Pixels in somebody else's memory.
     #[cfg(feature = "gpu")]
-    pub(crate) fn lent(memory: Arc<dyn LentMemory>) -> Self {
-        Self(Memory::Lent(memory))
+    pub(crate) fn shared(memory: Arc<dyn SharedMemory>) -> Self {
+        Self(Memory::Shared(memory))
     }
 
     /// The bytes as a vector: a copy, if they lie in memory of a GPU.
     pub fn into_vec(self) -> Vec<u8> {
         match self.0 {
             Memory::Own(bytes) => bytes,
-            Memory::Lent(memory) => memory.bytes().to_vec(),
+            Memory::Shared(memory) => memory.bytes().to_vec(),
         }
     }
 }
@@ -55,7 +55,7 @@ impl Deref for Pixels {
     fn deref(&self) -> &[u8] {
         match &self.0 {
             Memory::Own(bytes) => bytes,
-            Memory::Lent(memory) => memory.bytes(),
+            Memory::Shared(memory) => memory.bytes(),
         }
     }
 }
@@ -63,12 +63,12 @@ impl Deref for Pixels {
 /// Bytes that lie in memory of a GPU are copied first.
 impl DerefMut for Pixels {
     fn deref_mut(&mut self) -> &mut [u8] {
-        if let Memory::Lent(memory) = &self.0 {
+        if let Memory::Shared(memory) = &self.0 {
             self.0 = Memory::Own(memory.bytes().to_vec());
         }
         match &mut self.0 {
             Memory::Own(bytes) => bytes,
-            Memory::Lent(_) => &mut [],
+            Memory::Shared(_) => &mut [],
         }
     }
 }

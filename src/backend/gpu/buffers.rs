@@ -204,7 +204,7 @@ impl Buffers {
         }
         let written = if gpu.maps_storage { U::STORAGE } else { U::empty() };
         if self.staging.is_none() {
-            self.staging = gpu.spare_stagings.take(size);
+            self.staging = gpu.readbacks.take(size);
         }
         Ok(grow(gpu, &mut self.staging, size, limit, U::MAP_READ | U::COPY_DST | written))
     }

@@ -135,7 +135,7 @@ impl Gpu {
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
         let info = GpuInfo { name: info.name, driver, device_type: type_name(info.device_type), features };
         Ok(Self {
-            handles: Handles { device, queue, limits, maps_storage, spare_stagings: Arc::default() },
+            handles: Handles { device, queue, limits, maps_storage, readbacks: Arc::default() },
             pipelines: Pipelines::kept_in(file),
             spare_buffers: SpareBuffers::default(),
             residents: ResidentBuffers::new(if is_software { RESIDENT_BYTES_SOFTWARE } else { RESIDENT_BYTES }),
@@ -167,10 +167,10 @@ impl Gpu {
         self.residents.bytes()
     }
 
-    /// Memory on the device for the buffers of jobs, kept for the next ones, bytes. None is kept without a
+    /// Memory of the buffers of jobs, on the device or where both sides reach it, kept for the next ones, bytes. None is kept without a
     /// renderer.
     pub fn spare_bytes(&self) -> u64 {
-        self.spare_buffers.bytes() + self.handles.spare_stagings.bytes()
+        self.spare_buffers.bytes() + self.handles.readbacks.bytes()
     }
 
     /// Counts a job.
@@ -200,13 +200,14 @@ impl Gpu {
     /// To be called for each new renderer.
     pub(super) fn renderer_made(&self) {
         self.renderers.fetch_add(1, Ordering::Relaxed);
+        self.handles.readbacks.open();
     }
 
     /// To be called when a renderer is dropped.
     pub(super) fn renderer_dropped(&self) {
         if self.renderers.fetch_sub(1, Ordering::AcqRel) == 1 {
             self.spare_buffers.clear();
-            self.handles.spare_stagings.clear();
+            self.handles.readbacks.close();
         }
     }
 
@@ -335,6 +336,8 @@ impl Gpu {
             Err(TryLockError::Poisoned(polling)) => polling.into_inner(),
             Ok(polling) => polling,
         };
+        // A poll of a lost device frees its buffers, and encoders may be reading some.
+        self.check()?;
         // Real device loss panics inside poll, whatever handlers are set.
         match catch_unwind(AssertUnwindSafe(|| self.handles.device.poll(wgpu::PollType::Poll))) {
             Ok(Ok(_)) => Ok(()),
@@ -364,9 +367,9 @@ fn find_adapter(kind: GpuKind) -> Result<wgpu::Adapter, DrawError> {
     descriptor.backends = wgpu::Backends::VULKAN;
     descriptor.flags = wgpu::InstanceFlags::empty();
     // Refuse to allocate before the system begins to swap GPU memory: a refused job is better than
-    // a lost device.
+    // a lost device. wgpu is not to give a device up by itself: it would free what encoders read.
     descriptor.memory_budget_thresholds =
-        wgpu::MemoryBudgetThresholds { for_resource_creation: Some(90), for_device_loss: Some(99) };
+        wgpu::MemoryBudgetThresholds { for_resource_creation: Some(90), for_device_loss: None };
     let instance = wgpu::Instance::new(descriptor);
     let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
     if adapters.is_empty() {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::staging::SpareStagings;
+use super::staging::ReadbackPool;
 
 /// Device, queue and limits of an opened GPU.
 pub struct Handles {
@@ -12,5 +12,5 @@ pub struct Handles {
     /// True if kernels can write to a buffer that the CPU reads, and read one that it writes.
     pub maps_storage: bool,
     /// Buffers for the next pictures.
-    pub spare_stagings: Arc<SpareStagings>,
+    pub readbacks: Arc<ReadbackPool>,
 }

@@ -3,8 +3,9 @@
 //! In reading order: `device` opens a GPU; `schedule` computes the dispatches for a plan;
 //! `recorder` turns them into commands; `pipelines` holds each kernel's source, bindings and
 //! specialisation; `stage_clock` times the stages; `params` holds the uniforms, `buffers` a job's memory,
-//! `staging` the buffers that pictures are read from, `residents` what stays in memory for the next job, `gang` the jobs that share dispatches, `pass_mask` the passes over triangles. `displays` keeps
-//! drivers from looking for a window system.
+//! `staging` the buffers that pictures are read from, `residents` what stays in memory for the next job,
+//! `gang` the jobs that share dispatches, `pass_mask` the passes over triangles. `displays` keeps drivers
+//! from looking for a window system.
 //!
 //! **Invariant:** a job uses the device on one thread only, because wgpu's error scopes belong to a
 //! thread.
@@ -169,7 +170,9 @@ impl Renderer for GpuRenderer {
     fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
         match self.draw_once(plan, deadline) {
             // Perhaps there was no memory left.
-            Err(DrawError::Device(_)) if self.gpu.residents.clear() => self.draw_once(plan, deadline),
+            Err(DrawError::Device(_)) if self.gpu.residents.clear() | self.gpu.handles.readbacks.clear() => {
+                self.draw_once(plan, deadline)
+            }
             result => result,
         }
     }

@@ -197,7 +197,7 @@ impl<'a> Recorder<'a> {
         let staging = self.buffers.staging.take().ok_or_else(|| DrawError::Device("no memory to read".to_owned()))?;
         self.submit()?;
         let view = self.gpu.map(&staging, size, self.deadline)?;
-        Ok(Mapped::new(view, staging, &self.gpu.handles.spare_stagings))
+        Ok(Mapped::new(view, staging, &self.gpu.handles.readbacks))
     }
 
     fn read(&mut self, buffer: &wgpu::Buffer, size: u64, read: impl FnOnce(&[u8])) -> Result<(), DrawError> {

@@ -1,56 +1,76 @@
 //! Buffers that the CPU reads pictures from, in place, while other jobs draw into others.
 
 use std::ops::Range;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::image::{LentMemory, Pixels};
+use crate::image::{Pixels, SharedMemory};
 
 /// Largest memory of the spare buffers, bytes: on a software implementation it is the process's memory.
 const KEPT_BYTES_MAX: u64 = 256 << 20;
 
-/// Buffers that no job uses.
+/// Buffers that no picture lies in.
 ///
 /// A job takes one, and its picture keeps it until the last reader of its pixels is done. So there are as many as
 /// pictures are drawn and encoded at a time.
 #[derive(Default)]
-pub struct SpareStagings(Mutex<Vec<wgpu::Buffer>>);
+pub struct ReadbackPool(Mutex<Spare>);
 
-impl SpareStagings {
+#[derive(Default)]
+struct Spare {
+    /// The oldest first.
+    buffers: Vec<wgpu::Buffer>,
+    /// True while somebody draws: then buffers are kept.
+    is_open: bool,
+}
+
+impl ReadbackPool {
+    /// Keeps buffers from now on.
+    pub fn open(&self) {
+        self.lock().is_open = true;
+    }
+
+    /// Frees all buffers, and those that are given back from now on.
+    pub fn close(&self) {
+        self.lock().is_open = false;
+        self.clear();
+    }
+
     /// The smallest buffer of at least `size` bytes.
     pub fn take(&self, size: u64) -> Option<wgpu::Buffer> {
         let mut spare = self.lock();
-        let fits = spare.iter().enumerate().filter(|(_, buffer)| buffer.size() >= size);
+        let fits = spare.buffers.iter().enumerate().filter(|(_, buffer)| buffer.size() >= size);
         let (at, _) = fits.min_by_key(|(_, buffer)| buffer.size())?;
-        Some(spare.remove(at))
+        Some(spare.buffers.remove(at))
     }
 
     /// Takes back a buffer that is not mapped. The oldest go where all together would be too much.
-    pub fn give_back(&self, buffer: wgpu::Buffer) {
+    fn give_back(&self, buffer: wgpu::Buffer) {
         let mut spare = self.lock();
-        spare.push(buffer);
-        let mut kept: u64 = spare.iter().map(wgpu::Buffer::size).sum();
+        spare.buffers.push(buffer);
+        let mut kept: u64 = spare.buffers.iter().map(wgpu::Buffer::size).sum();
         let mut oldest = 0;
-        while kept > KEPT_BYTES_MAX && oldest < spare.len() {
-            kept -= spare[oldest].size();
+        while (kept > KEPT_BYTES_MAX || !spare.is_open) && oldest < spare.buffers.len() {
+            kept -= spare.buffers[oldest].size();
             oldest += 1;
         }
-        let freed: Vec<_> = spare.drain(..oldest).collect();
+        let freed: Vec<_> = spare.buffers.drain(..oldest).collect();
         drop(spare);
         drop(freed);
     }
 
-    /// Frees all.
-    pub fn clear(&self) {
-        let freed = std::mem::take(&mut *self.lock());
-        drop(freed);
+    /// Frees all. True if there were some.
+    pub fn clear(&self) -> bool {
+        let freed = std::mem::take(&mut self.lock().buffers);
+        !freed.is_empty()
     }
 
     /// Memory of all, bytes.
     pub fn bytes(&self) -> u64 {
-        self.lock().iter().map(wgpu::Buffer::size).sum()
+        self.lock().buffers.iter().map(wgpu::Buffer::size).sum()
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<wgpu::Buffer>> {
+    fn lock(&self) -> MutexGuard<'_, Spare> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -60,13 +80,13 @@ pub struct Mapped {
     /// Some until this is dropped.
     view: Option<wgpu::BufferView>,
     buffer: Option<wgpu::Buffer>,
-    spare: Arc<SpareStagings>,
+    pool: Arc<ReadbackPool>,
 }
 
 impl Mapped {
     /// What the CPU reads of a buffer, which is mapped.
-    pub fn new(view: wgpu::BufferView, buffer: wgpu::Buffer, spare: &Arc<SpareStagings>) -> Self {
-        Self { view: Some(view), buffer: Some(buffer), spare: spare.clone() }
+    pub fn new(view: wgpu::BufferView, buffer: wgpu::Buffer, pool: &Arc<ReadbackPool>) -> Self {
+        Self { view: Some(view), buffer: Some(buffer), pool: pool.clone() }
     }
 
     /// The bytes that were mapped.
@@ -76,18 +96,23 @@ impl Mapped {
 
     /// A range of the bytes as a picture's pixels; none of them where the range is beyond their end.
     pub fn pixels(mapped: &Arc<Self>, range: Range<usize>) -> Pixels {
-        Pixels::lent(Arc::new(Part { mapped: mapped.clone(), range }))
+        Pixels::shared(Arc::new(Part { mapped: mapped.clone(), range }))
     }
 }
 
 impl Drop for Mapped {
     fn drop(&mut self) {
-        // Before the buffer is unmapped.
-        self.view = None;
-        if let Some(buffer) = self.buffer.take() {
-            buffer.unmap();
-            self.spare.give_back(buffer);
-        }
+        let (view, buffer) = (self.view.take(), self.buffer.take());
+        let unmap = || {
+            // Before the buffer is unmapped.
+            drop(view);
+            if let Some(buffer) = buffer {
+                buffer.unmap();
+                self.pool.give_back(buffer);
+            }
+        };
+        // wgpu may panic if the device is lost.
+        let _ = catch_unwind(AssertUnwindSafe(unmap));
     }
 }
 
@@ -97,7 +122,7 @@ struct Part {
     range: Range<usize>,
 }
 
-impl LentMemory for Part {
+impl SharedMemory for Part {
     fn bytes(&self) -> &[u8] {
         self.mapped.bytes().get(self.range.clone()).unwrap_or_default()
     }

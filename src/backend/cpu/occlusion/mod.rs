@@ -64,8 +64,8 @@ impl Occlusion {
         });
     }
 
-    /// As [`Self::open_share`] for eight neighbours in a row. Those that get bits show another surface, and their shares
-    /// are not found here.
+    /// As [`Self::open_share`] for eight neighbours in a row. Returns a bit, from the lowest, for each that shows another
+    /// surface: its share is not found here.
     #[inline(always)]
     pub fn open_shares(
         &self,

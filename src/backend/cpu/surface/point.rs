@@ -119,18 +119,18 @@ impl Points<'_> {
     #[inline(always)]
     fn common<const N: usize>(&self, ids: &[u32; N], at: &[[f32; N]; 2], open: &[f32; N]) -> [[f32; N]; 4] {
         let Self { context, surface, material, show } = self;
-        let corners = Corners::new(context, ids, at);
+        let b = Barycentrics::new(&Corners::new(context, ids, at));
         let color = match &surface.vertex_normals {
             Some(normals) if material.flags & flags::VERTEX_NORMALS != 0 => {
-                self.smooth(&corners, &of_corners(normals, ids), open)
+                self.smooth(&b, &of_corners(normals, ids), open)
             }
-            _ => self.even(ids, &Barycentrics::new(&corners).front, open),
+            _ => self.even(ids, &b.front, open),
         };
         if material.flags & flags::WIRE_FWIDTH == 0 || show.wires == 0.0 {
             return color;
         }
         let masks = ids.map(|id| edge_mask(surface, id));
-        let covers = fwidth_covers(&masks, material, &Barycentrics::new(&corners)).map(|cover| show.wires * cover);
+        let covers = fwidth_covers(&masks, material, &b).map(|cover| show.wires * cover);
         over(&covers, material.wire_color, &color)
     }
 
@@ -138,12 +138,11 @@ impl Points<'_> {
     #[inline(always)]
     pub fn smooth<const N: usize>(
         &self,
-        corners: &Corners<N>,
+        b: &Barycentrics<N>,
         normals: &[[[f32; N]; 3]; 3],
         open: &[f32; N],
     ) -> [[f32; N]; 4] {
         let Self { context, surface, material, show } = self;
-        let b = Barycentrics::new(corners);
         let normal = facing(&blend(normals, &b.value), &b.front);
         let (metallic, roughness) = ([material.metallic; N], [material.roughness; N]);
         let projection = &context.plan.projection;

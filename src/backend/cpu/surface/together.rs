@@ -34,7 +34,7 @@ fn shade_sampled<const S: usize>(context: &RasterContext<'_>, band: &SampleBand,
     }
 }
 
-/// As [`shade`].
+/// As [`shade`] where the surface is shaded, many points at a time.
 #[inline(always)]
 fn shade_together<const S: usize>(
     (context, surface): (&RasterContext<'_>, &SurfacePass<'_>),
@@ -85,12 +85,12 @@ impl Finder<'_> {
         row: usize,
         colors: &mut [[f32; 4]],
     ) {
-        let (mut is_any, mut is_hull) = (0, false);
+        let (mut not_empty, mut is_hull) = (0, false);
         for id in ids.as_flattened() {
-            is_any |= id ^ NOTHING;
+            not_empty |= id ^ NOTHING;
             is_hull |= (*id >= self.triangles) & (*id != NOTHING);
         }
-        if is_any == 0 {
+        if not_empty == 0 {
             return;
         }
         if is_hull {

@@ -1,6 +1,6 @@
 //! Stage shade: points of a band wait until there are many of one material, and are shaded together.
 
-use super::barycentric::Corners;
+use super::barycentric::{Barycentrics, Corners};
 use super::point::{Points, Show, is_smooth};
 use super::texture::of_corners;
 use crate::backend::cpu::RasterContext;
@@ -95,7 +95,8 @@ fn shade_kernel(context: &RasterContext<'_>, surface: &SurfacePass<'_>, points: 
     let shader = Points { context, surface, material, show: Show::ALL };
     let groups = (0..points.len.min(BLOCK)).step_by(LANES);
     match &surface.vertex_normals {
-        Some(normals) if is_smooth(surface, material) => {
+        // The same colours as below. Fewer points would not be worth the reading.
+        Some(normals) if points.len > LANES && is_smooth(surface, material) => {
             let corners = Corners::new(context, &points.ids, &points.at);
             let normals = of_corners(normals, &points.ids);
             for first in groups {
@@ -103,7 +104,11 @@ fn shade_kernel(context: &RasterContext<'_>, surface: &SurfacePass<'_>, points: 
                 for (own, all) in own.as_flattened_mut().iter_mut().zip(normals.as_flattened()) {
                     *own = part(all, first);
                 }
-                points.add(first, &shader.smooth(&corners.part(first), &own, &part(&points.open, first)), colors);
+                points.add(
+                    first,
+                    &shader.smooth(&Barycentrics::new(&corners.part(first)), &own, &part(&points.open, first)),
+                    colors,
+                );
             }
         }
         _ => {

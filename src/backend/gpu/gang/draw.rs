@@ -109,7 +109,7 @@ fn submit(
     let staging = buffers.staging.take().ok_or_else(|| DrawError::Device("no memory for pictures".to_owned()))?;
     // No deadline ends this: a gang is many jobs', and small.
     let view = gpu.map(&staging, size, &Deadline::default())?;
-    Ok(Pictures { mapped: Arc::new(Mapped::new(view, staging, &gpu.handles.spare_stagings)), ends: ends.into() })
+    Ok(Pictures { mapped: Arc::new(Mapped::new(view, staging, &gpu.handles.readbacks)), ends: ends.into() })
 }
 
 /// Reserves what the kernels write, for all jobs.

@@ -2,7 +2,7 @@
 
 pub mod flat;
 mod gangs;
-mod lent;
 pub mod pictures;
 pub mod shade;
+mod shared_pixels;
 pub mod visibility;
