@@ -200,7 +200,6 @@ impl Gpu {
     /// To be called for each new renderer.
     pub(super) fn renderer_made(&self) {
         self.renderers.fetch_add(1, Ordering::Relaxed);
-        self.handles.readbacks.open();
     }
 
     /// To be called when a renderer is dropped.

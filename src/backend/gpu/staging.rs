@@ -20,17 +20,12 @@ pub struct ReadbackPool(Mutex<Spare>);
 struct Spare {
     /// The oldest first.
     buffers: Vec<wgpu::Buffer>,
-    /// True while somebody draws: then buffers are kept.
+    /// True from when a job takes one until nobody draws any more: then buffers are kept.
     is_open: bool,
 }
 
 impl ReadbackPool {
-    /// Keeps buffers from now on.
-    pub fn open(&self) {
-        self.lock().is_open = true;
-    }
-
-    /// Frees all buffers, and those that are given back from now on.
+    /// Frees all buffers, and those that are given back before the next job takes one.
     pub fn close(&self) {
         self.lock().is_open = false;
         self.clear();
@@ -39,6 +34,7 @@ impl ReadbackPool {
     /// The smallest buffer of at least `size` bytes.
     pub fn take(&self, size: u64) -> Option<wgpu::Buffer> {
         let mut spare = self.lock();
+        spare.is_open = true;
         let fits = spare.buffers.iter().enumerate().filter(|(_, buffer)| buffer.size() >= size);
         let (at, _) = fits.min_by_key(|(_, buffer)| buffer.size())?;
         Some(spare.buffers.remove(at))
@@ -84,7 +80,7 @@ pub struct Mapped {
 }
 
 impl Mapped {
-    /// What the CPU reads of a buffer, which is mapped.
+    /// The mapped part of a buffer.
     pub fn new(view: wgpu::BufferView, buffer: wgpu::Buffer, pool: &Arc<ReadbackPool>) -> Self {
         Self { view: Some(view), buffer: Some(buffer), pool: pool.clone() }
     }
