@@ -32,7 +32,7 @@ mod surface;
 mod uv_layout;
 mod warnings;
 
-pub use crate::texture::{Texture, TextureError, Textures};
+pub use crate::texture::{Texels, Texture, TextureError, Textures};
 pub use build::{build, build_from, build_keeping};
 pub use error::PlanError;
 pub use framing::framing;

@@ -11,8 +11,7 @@ use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::Orientation;
 use crate::plan::cut_outs::CutOuts;
 use crate::plan::edges::face_runs::FaceRuns;
-use crate::texture::mips::Reading;
-use crate::texture::{TextureError, Textures};
+use crate::texture::kept::KeptTextures;
 
 /// Facts about one mesh, which must not change. Each is found when a plan first needs it. Plans that
 /// need it at the same time may each find it, and the first one's is kept: a thread that waited for
@@ -26,7 +25,7 @@ pub struct Prepared {
     face_runs: OnceLock<(Arc<FaceRuns>, Vec<Spent>)>,
     cut_outs: OnceLock<(Arc<CutOuts>, Vec<Spent>)>,
     vertex_normals: Mutex<Option<VertexNormals>>,
-    textures: Mutex<Option<PreparedTextures>>,
+    textures: KeptTextures,
 }
 
 /// Vertex normals of a mesh that brings none.
@@ -46,17 +45,6 @@ pub struct VertexNormals {
 /// not changed as long as its token lives.
 #[derive(Debug, Default)]
 pub struct MeshToken;
-
-/// Textures of a mesh, decoded.
-#[derive(Clone, Debug)]
-pub struct PreparedTextures {
-    /// The images, by index, and how each was read.
-    pub images: Vec<(u32, Reading)>,
-    /// The textures.
-    pub textures: Arc<Textures>,
-    /// Indices of those without pixels, because their images are broken, with the faults.
-    pub broken: Arc<[(u32, TextureError)]>,
-}
 
 impl Prepared {
     /// The mesh's identity.
@@ -133,33 +121,23 @@ impl Prepared {
         Ok(found)
     }
 
-    /// The textures that were kept last.
-    pub fn textures(&self) -> Option<PreparedTextures> {
-        self.locked_textures().clone()
-    }
-
-    /// Keeps textures instead of those before.
-    pub fn keep_textures(&self, textures: PreparedTextures) {
-        *self.locked_textures() = Some(textures);
+    /// The decoded images.
+    pub(crate) fn textures(&self) -> &KeptTextures {
+        &self.textures
     }
 
     /// Memory of what is kept, bytes.
     pub fn bytes(&self) -> u64 {
         let edges = self.edges.get().map_or(0, |(edges, _)| edges.bytes());
         let normals = self.locked_normals().as_ref().map_or(0, VertexNormals::bytes);
-        let textures = self.locked_textures().as_ref().map_or(0, |kept| size_of_val(&kept.textures.texels[..]));
         let looked_at = self.looked_at.get().map_or(0, |(faces, _)| size_of_val(&faces[..]));
         let runs = self.face_runs.get().map_or(0, |(runs, _)| runs.bytes());
         let cut_outs = self.cut_outs.get().map_or(0, |(cut_outs, _)| cut_outs.bytes());
-        (edges + normals + textures + looked_at + runs + cut_outs) as u64
+        (edges + normals + looked_at + runs + cut_outs) as u64 + self.textures.bytes()
     }
 
     fn locked_normals(&self) -> MutexGuard<'_, Option<VertexNormals>> {
         self.vertex_normals.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn locked_textures(&self) -> MutexGuard<'_, Option<PreparedTextures>> {
-        self.textures.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -188,16 +166,5 @@ impl VertexNormals {
 
     fn bytes(&self) -> usize {
         size_of_val(&self.normals[..]) + self.triangles.as_ref().map_or(0, |triangles| size_of_val(&triangles[..]))
-    }
-}
-
-impl PreparedTextures {
-    /// True if these are the wanted images and show the same as textures that begin with `first_levels`,
-    /// given the finest levels that pixels ask for. Levels finer than those change nothing. But of an image
-    /// that begins with a coarser one, for lack of room, pixels show the first that there is.
-    pub fn have(&self, images: &[(u32, Reading)], first_levels: &[u32], finest: &[u32]) -> bool {
-        let kept = self.textures.images.iter().map(|texture| texture.first_level);
-        let is_same = |((kept, &first), &finest): ((u32, &u32), &u32)| kept == first || kept < first && first <= finest;
-        self.images == images && kept.zip(first_levels).zip(finest).all(is_same)
     }
 }

@@ -11,6 +11,7 @@
 //! - [`mips`]: makes the levels of one image.
 //! - [`coverage`]: keeps cut-outs as wide at coarse levels as they are.
 //! - [`fit`]: chooses the finest level of each image, so that all textures of a picture fit.
+//! - [`kept`]: a mesh's decoded images, from one picture to the next.
 //!
 //! Memory is paid for first. A header says how much decoding takes, the caller spends that from the
 //! job's budget, and only then are pixels decoded. The plan decides which images a picture needs
@@ -25,25 +26,24 @@ pub(crate) mod basis;
 pub(crate) mod coverage;
 pub(crate) mod decode;
 pub(crate) mod fit;
+pub(crate) mod kept;
 pub(crate) mod mips;
 pub(crate) mod png;
 
+use std::ops::Deref;
+use std::sync::Arc;
+
 use crate::warning::Warning;
 
-/// Decoded textures with their levels.
+/// The textures of a picture.
 #[derive(Clone, Debug, Default)]
 pub struct Textures {
-    /// Linear RGBA with straight alpha, as IEEE 754 half floats: row by row, then level by level
-    /// (finest first), then image by image.
-    pub texels: Vec<[u16; 4]>,
-    /// The place of each image in `texels`.
+    /// By the index that a material's use has.
     pub images: Vec<Texture>,
 }
 
-/// An image in [`Textures::texels`]. Level k has `max(1, width >> k)` by `max(1, height >> k)`
-/// texels.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+/// An image with its levels. Level k has `max(1, width >> k)` by `max(1, height >> k)` texels.
+#[derive(Clone, Debug)]
 pub struct Texture {
     /// Columns of level 0, texels.
     pub width: u32,
@@ -53,10 +53,67 @@ pub struct Texture {
     pub first_level: u32,
     /// One more than the number of the coarsest level, which has a single texel.
     pub levels: u32,
-    /// Index in [`Textures::texels`] of the first texel of `first_level`.
-    pub first_texel: u32,
-    /// Always 0: shaders read an entry as four words of 8 bytes.
-    pub padding: [u32; 3],
+    /// The levels from `first_level` on; none of an image that is broken.
+    pub texels: Texels,
+}
+
+/// Linear RGBA with straight alpha, as IEEE 754 half floats: row by row, then level by level, finest first.
+///
+/// A slice, of memory that several pictures may share.
+#[derive(Clone, Debug, Default)]
+pub struct Texels {
+    all: Arc<Vec<[u16; 4]>>,
+    first: usize,
+}
+
+impl Textures {
+    /// Number of texels of all images.
+    pub fn texel_count(&self) -> u64 {
+        self.images.iter().map(|image| image.texels.len() as u64).sum()
+    }
+
+    /// True if the others are the same texels in memory, image by image.
+    fn are_same(&self, others: &Self) -> bool {
+        let is_same = |(a, b): (&Texture, &Texture)| a.first_level == b.first_level && a.texels.is_same(&b.texels);
+        self.images.len() == others.images.len() && self.images.iter().zip(&others.images).all(is_same)
+    }
+}
+
+impl Texture {
+    /// The same from a coarser level on.
+    pub fn from_level(&self, first_level: u32) -> Self {
+        let texels = |first| mips::texels(self.width, self.height, first) as usize;
+        let first_level = first_level.clamp(self.first_level, self.levels.max(1) - 1);
+        let skipped = texels(self.first_level) - texels(first_level);
+        let first = (self.texels.first + skipped).min(self.texels.all.len());
+        Self { first_level, texels: Texels { all: Arc::clone(&self.texels.all), first }, ..*self }
+    }
+}
+
+impl Texels {
+    /// True if the others are the same in memory. All without texels are.
+    fn is_same(&self, others: &Self) -> bool {
+        Arc::ptr_eq(&self.all, &others.all) && self.first == others.first || self.is_empty() && others.is_empty()
+    }
+
+    /// True if these are in the memory of the others.
+    fn is_of(&self, others: &Self) -> bool {
+        Arc::ptr_eq(&self.all, &others.all)
+    }
+}
+
+impl From<Vec<[u16; 4]>> for Texels {
+    fn from(texels: Vec<[u16; 4]>) -> Self {
+        Self { all: Arc::new(texels), first: 0 }
+    }
+}
+
+impl Deref for Texels {
+    type Target = [[u16; 4]];
+
+    fn deref(&self) -> &Self::Target {
+        self.all.get(self.first..).unwrap_or_default()
+    }
 }
 
 /// An image that cannot become a texture.

@@ -33,7 +33,7 @@ pub use crate::backend::{GpuInfo, GpuKind};
 
 use self::buffers::Buffers;
 use self::gang::{Seat as _, Share, Turn, may_share};
-use self::params::{attributes, corner_triangles, edge_lists, hull_materials, sample_masks};
+use self::params::{attributes, corner_triangles, edge_lists, hull_materials, sample_masks, texture_table};
 use self::pipelines::Slot;
 use self::pipelines::key::pipeline_key;
 use self::recorder::Recorder;
@@ -446,9 +446,11 @@ fn upload_surface(
     };
     let slices: Vec<&[u8]> = lists.into_iter().map(bytemuck::cast_slice).collect();
     supply(gpu, buffers, Slot::CornerTriangles, source, &slices)?;
-    let (images, texels) = (&surface.textures.images[..], &surface.textures.texels[..]);
-    let source = Source::of_arc(&surface.textures, size_of_val(images) + size_of_val(texels));
-    supply(gpu, buffers, Slot::Texels, source, &[bytemuck::cast_slice(images), bytemuck::cast_slice(texels)])
+    let images = texture_table(&surface.textures);
+    let mut parts: Vec<&[u8]> = vec![bytemuck::cast_slice(&images)];
+    parts.extend(surface.textures.images.iter().map(|image| bytemuck::cast_slice::<_, u8>(&image.texels)));
+    let source = Source::of_arc(&surface.textures, parts.iter().map(|part| part.len()).sum());
+    supply(gpu, buffers, Slot::Texels, source, &parts)
 }
 
 /// Records all steps; `end_band` takes a finished band's rows away.

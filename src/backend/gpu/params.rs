@@ -5,7 +5,9 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 
 use crate::backend::sample_partition::{POINTS, sample_partition};
-use crate::plan::{DrawPlan, Edge, Faces, HullPass, Lights, LinePass, OcclusionPass, SurfacePass, TAPS};
+use crate::plan::{
+    DrawPlan, Edge, Faces, HullPass, Lights, LinePass, OcclusionPass, SurfacePass, TAPS, Texture, Textures,
+};
 
 /// Uniforms of a plan.
 #[repr(C)]
@@ -50,6 +52,31 @@ pub struct Frame {
     pub padding_a: u32,
     pub padding_b: u32,
     pub padding_c: u32,
+}
+
+/// An image as shaders/surface/texture.wgsl reads it: four vectors of two words.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct TextureEntry {
+    pub width: u32,
+    pub height: u32,
+    pub first_level: u32,
+    pub levels: u32,
+    /// Place of its first texel among those of all images.
+    pub first_texel: u32,
+    pub padding: [u32; 3],
+}
+
+/// The images of a picture, whose texels follow one another.
+pub fn texture_table(textures: &Textures) -> Vec<TextureEntry> {
+    let mut first_texel = 0;
+    let entry = |image: &Texture| {
+        let &Texture { width, height, first_level, levels, .. } = image;
+        let entry = TextureEntry { width, height, first_level, levels, first_texel, padding: [0; 3] };
+        first_texel += image.texels.len() as u32;
+        entry
+    };
+    textures.images.iter().map(entry).collect()
 }
 
 /// Uniforms of a dispatch.

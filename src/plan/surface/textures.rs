@@ -10,15 +10,16 @@ use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
 use crate::mesh::material::{ImageContent, ImageSource, TextureRef, Wrap};
 use crate::plan::geometry::Geometry;
-use crate::plan::prepared::{Prepared, PreparedTextures};
+use crate::plan::prepared::Prepared;
 use crate::plan::projection::Projection;
 use crate::plan::skips::{SkipKind, Skips};
 use crate::plan::surface::closeup;
 use crate::plan::surface::closeup::Use;
 use crate::plan::{PlanError, TextureUse};
-use crate::texture::decode::{self, Header};
+use crate::texture::decode::{self, Header, Pixels};
+use crate::texture::kept::{Decoded, ImageKey, KeptTextures};
 use crate::texture::mips::Reading;
-use crate::texture::{Texture, TextureError, Textures, fit, mips};
+use crate::texture::{Texels, Texture, TextureError, Textures, fit, mips};
 
 /// Memory of images that are decoded at once, bytes: three of 2048 x 2048 texels in JPEG.
 const TOGETHER_BYTES_MAX: u64 = 256 << 20;
@@ -146,55 +147,83 @@ impl<'a> TextureLoader<'a> {
         let skip = skips.skip(SkipKind::FineTextureLevels, is_unneeded, "no pixel comes close enough to see them");
         let first_levels = fit::first_levels(&sizes, &finest, skip);
 
-        let texels = |w: &Wanted, first: u32| mips::texels(w.header.width, w.header.height, first);
-        let total: u64 = wanted.iter().zip(&first_levels).map(|(w, &first)| texels(w, first)).sum();
+        let texels = |(w, &first): (&Wanted, &u32)| mips::texels(w.header.width, w.header.height, first);
+        let total: u64 = wanted.iter().zip(&first_levels).map(texels).sum();
         budget.spend("textures", total, 8)?;
-        let of_wanted = |w: &Wanted| (w.image, w.reading);
         let decoding: Vec<u64> = wanted.iter().map(Wanted::decoding_bytes).collect();
         // Also where nothing is decoded: what is kept must refuse no less.
         let batches = spend_on_decoding(&decoding, budget)?;
-        let kept = prepared.and_then(Prepared::textures);
-        let images: Vec<(u32, Reading)> = wanted.iter().map(of_wanted).collect();
-        if let Some(kept) = kept.filter(|kept| kept.have(&images, &first_levels, &finest)) {
-            return Ok(LoadedTextures::new(&kept, faults));
+        let kept = prepared.map(Prepared::textures);
+        let find = |(w, &first): (&Wanted, &u32)| kept.and_then(|kept| kept.find(w.key(), first));
+        let mut decoded: Vec<Option<Decoded>> = wanted.iter().zip(&first_levels).map(find).collect();
+        let mut missing = Vec::new();
+        for (place, (want, &first_level)) in decoded.iter_mut().zip(wanted.iter().zip(&first_levels)) {
+            let is_missing = place.is_none();
+            let image = &mesh.images[want.image as usize];
+            missing.push(is_missing.then_some(Decoding { image, want, first_level, place }));
         }
-        let mut textures = Textures { texels: vec![[0; 4]; total as usize], images: Vec::new() };
-        let mut decodings = Vec::new();
-        let mut rest = &mut textures.texels[..];
-        let mut first_texel = 0;
-        for (want, &first_level) in wanted.iter().zip(&first_levels) {
-            let Header { width, height, .. } = want.header;
-            let (out, others) = rest.split_at_mut(texels(want, first_level) as usize);
-            let levels = mips::count(width, height);
-            textures.images.push(Texture { width, height, first_level, levels, first_texel, padding: [0; 3] });
-            first_texel += out.len() as u32;
-            decodings.push(Decoding { image: &mesh.images[want.image as usize], want, first_level, out });
-            rest = others;
+        decode_all(missing, &batches, deadline)?;
+        let decoded: Vec<Decoded> = decoded.into_iter().flatten().collect();
+        for (want, decoded) in wanted.iter().zip(&decoded) {
+            kept.inspect(|kept| kept.keep(want.key(), decoded));
         }
-        let broken = decode_all(decodings, &batches, deadline)?;
-        let decoded = PreparedTextures { images, textures: Arc::new(textures), broken: broken.into() };
-        let loaded = LoadedTextures::new(&decoded, faults);
-        if let Some(prepared) = prepared {
-            prepared.keep_textures(decoded);
-        }
-        Ok(loaded)
+        Ok(LoadedTextures::new(&wanted, decoded, (&first_levels, &finest), kept, faults))
     }
 }
 
 impl LoadedTextures {
-    /// Decoded textures, and the faults of images that were not decoded at all.
-    fn new(decoded: &PreparedTextures, mut faults: BTreeMap<u32, TextureError>) -> Self {
-        // An image that is read in two ways is broken once.
-        faults.extend(decoded.broken.iter().map(|(index, fault)| (decoded.images[*index as usize].0, fault.clone())));
-        Self {
-            textures: Arc::clone(&decoded.textures),
-            broken: decoded.broken.iter().map(|(index, _)| *index).collect(),
-            faults: faults.into_values().collect(),
+    /// Decoded images, those that are kept maybe from finer levels on than wanted, and the faults of images that
+    /// were not decoded at all.
+    fn new(
+        wanted: &[Wanted],
+        decoded: Vec<Decoded>,
+        (first_levels, finest): (&[u32], &[u32]),
+        kept: Option<&KeptTextures>,
+        mut faults: BTreeMap<u32, TextureError>,
+    ) -> Self {
+        let (mut images, mut broken) = (Vec::with_capacity(wanted.len()), Vec::new());
+        for (index, (want, decoded)) in wanted.iter().zip(decoded).enumerate() {
+            images.push(decoded.unwrap_or_else(|fault| {
+                broken.push(index as u32);
+                // An image that is read in two ways is broken once.
+                faults.insert(want.image, fault);
+                want.without_texels()
+            }));
+        }
+        let mut textures = Textures { images };
+        cut_to_fit(&mut textures, first_levels, finest);
+        let textures = match kept {
+            Some(kept) => kept.shared(wanted.iter().map(Wanted::key).collect(), textures),
+            None => Arc::new(textures),
+        };
+        Self { textures, broken, faults: faults.into_values().collect() }
+    }
+}
+
+/// Leaves out levels that are finer than wanted where they would be seen, or where all together are too large.
+/// Elsewhere they stay: so pictures from near and from afar have the same textures.
+///
+/// They would be seen of an image that is to begin with a coarser level than pixels ask for, for lack of room.
+fn cut_to_fit(textures: &mut Textures, first_levels: &[u32], finest: &[u32]) {
+    let is_too_large = textures.texel_count() > fit::TEXELS_MAX;
+    for (texture, (&first, &finest)) in textures.images.iter_mut().zip(first_levels.iter().zip(finest)) {
+        if texture.first_level < first && (is_too_large || first > finest) {
+            *texture = texture.from_level(first);
         }
     }
 }
 
 impl Wanted {
+    fn key(&self) -> ImageKey {
+        (self.image, self.reading)
+    }
+
+    /// The texture of an image that is broken.
+    fn without_texels(&self) -> Texture {
+        let Header { width, height, .. } = self.header;
+        Texture { width, height, first_level: 0, levels: mips::count(width, height), texels: Texels::default() }
+    }
+
     /// Memory that decoding takes beside the levels.
     fn decoding_bytes(&self) -> u64 {
         let Header { width, height, decoding_bytes, .. } = self.header;
@@ -203,26 +232,33 @@ impl Wanted {
     }
 }
 
-/// An image that is to be decoded, and the place of its levels.
+/// An image that is to be decoded, and the place for its levels.
 struct Decoding<'a> {
     image: &'a ImageSource,
     want: &'a Wanted,
     first_level: u32,
-    out: &'a mut [[u16; 4]],
+    place: &'a mut Option<Decoded>,
 }
 
 impl Decoding<'_> {
-    /// Returns the fault of an image that is broken.
-    fn run(self, deadline: &Deadline) -> Result<Option<TextureError>, PlanError> {
+    fn run(self, deadline: &Deadline) -> Result<(), PlanError> {
         deadline.check()?;
-        let ImageContent::Encoded(encoded) = &self.image.content else { return Ok(None) };
-        match decode::decode(&self.image.name, encoded, &self.want.header) {
-            Ok(pixels) => {
-                mips::fill(&pixels, self.want.reading, self.first_level, self.out, deadline)?;
-                Ok(None)
-            }
-            Err(fault) => Ok(Some(fault)),
-        }
+        let Header { width, height, .. } = self.want.header;
+        let ImageContent::Encoded(encoded) = &self.image.content else {
+            *self.place = Some(Ok(self.want.without_texels()));
+            return Ok(());
+        };
+        let levels = |pixels: &Pixels| {
+            let mut texels = vec![[0; 4]; mips::texels(width, height, self.first_level) as usize];
+            mips::fill(pixels, self.want.reading, self.first_level, &mut texels, deadline)?;
+            let levels = mips::count(width, height);
+            Ok::<_, PlanError>(Texture { width, height, first_level: self.first_level, levels, texels: texels.into() })
+        };
+        *self.place = Some(match decode::decode(&self.image.name, encoded, &self.want.header) {
+            Ok(pixels) => Ok(levels(&pixels)?),
+            Err(fault) => Err(fault),
+        });
+        Ok(())
     }
 }
 
@@ -252,26 +288,16 @@ fn spend_on_decoding(decoding_bytes: &[u64], budget: &mut Budget) -> Result<Vec<
     Ok(batches)
 }
 
-/// Decodes images, so many together as `batches` says. Returns the faults of those that are broken, with
-/// their places.
-fn decode_all(
-    mut images: Vec<Decoding<'_>>,
-    batches: &[usize],
-    deadline: &Deadline,
-) -> Result<Vec<(u32, TextureError)>, PlanError> {
-    let mut faults = Vec::new();
-    let mut first = 0;
+/// Decodes images, so many together as `batches` says; None of those that need not be decoded.
+fn decode_all(mut images: Vec<Option<Decoding<'_>>>, batches: &[usize], deadline: &Deadline) -> Result<(), PlanError> {
     for &count in batches {
         let others = images.split_off(count.min(images.len()));
         // Of several errors, the first image's.
-        let results: Vec<_> = images.into_par_iter().map(|image| image.run(deadline)).collect();
-        for (index, result) in (first..).zip(results) {
-            faults.extend(result?.map(|fault| (index, fault)));
-        }
-        first += count as u32;
+        let results: Vec<_> = images.into_par_iter().flatten().map(|image| image.run(deadline)).collect();
+        results.into_iter().collect::<Result<(), _>>()?;
         images = others;
     }
-    Ok(faults)
+    Ok(())
 }
 
 /// Bits as in [`TextureUse::sampler`].
@@ -284,4 +310,34 @@ fn sampler(texture: &TextureRef) -> u32 {
     let nearest = if texture.nearest { super::samplers::NEAREST } else { 0 };
     let uvs = if texture.is_second_uvs { super::samplers::SECOND_UVS } else { 0 };
     wrap(texture.wrap[0]) | wrap(texture.wrap[1]) << super::samplers::DOWN_SHIFT | nearest | uvs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texture(side: u32, first_level: u32) -> Texture {
+        let texels = vec![[0; 4]; mips::texels(side, side, first_level) as usize].into();
+        Texture { width: side, height: side, first_level, levels: mips::count(side, side), texels }
+    }
+
+    fn cut(sides: &[u32], kept: &[u32], first_levels: &[u32], finest: &[u32]) -> Vec<u32> {
+        let images = sides.iter().zip(kept).map(|(&side, &first)| texture(side, first)).collect();
+        let mut textures = Textures { images };
+        cut_to_fit(&mut textures, first_levels, finest);
+        for image in &textures.images {
+            assert_eq!(image.texels.len() as u64, mips::texels(image.width, image.height, image.first_level));
+        }
+        textures.images.iter().map(|image| image.first_level).collect()
+    }
+
+    #[test]
+    fn finer_levels_stay_where_they_change_nothing_and_fit() {
+        // Pixels ask for level 2: what is finer is not seen.
+        assert_eq!(cut(&[64, 64], &[0, 1], &[2, 2], &[2, 2]), [0, 1]);
+        // Pixels ask for level 1, and there is no room for it.
+        assert_eq!(cut(&[64, 64], &[0, 1], &[2, 2], &[1, 2]), [2, 1]);
+        // 22 million texels, of which 12.6 are allowed.
+        assert_eq!(cut(&[4096, 64], &[0, 0], &[2, 2], &[2, 2]), [2, 2]);
+    }
 }

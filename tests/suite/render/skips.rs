@@ -58,7 +58,7 @@ fn turning_a_skip_off_changes_no_byte() {
     // Here they are really there, or really not.
     let surface = |scene: usize, keep: &[SkipKind]| {
         let surface = keeping(&mesh, &scenes::spec(TEXTURED[scene].1), keep).surface.unwrap();
-        (surface.textures.texels.len(), surface.uvs.is_some(), surface.colors.is_some())
+        (surface.textures.texel_count(), surface.uvs.is_some(), surface.colors.is_some())
     };
     let all = 87_381;
     let (small, uvs, _) = surface(0, &[]);

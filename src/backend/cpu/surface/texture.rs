@@ -90,6 +90,7 @@ pub fn sample<const N: usize>(textures: &Textures, used: &TextureUse, taps_max: 
     let Some(image) = textures.images.get(used.texture as usize) else {
         return out;
     };
+    let texels = &image.texels[..];
     let size = [image.width as f32, image.height as f32];
     let mut at = [[0.0; 2]; N];
     let mut footprints = [Footprint { taps: 1, lod: 0.0, axis: [0.0; 2] }; N];
@@ -104,7 +105,7 @@ pub fn sample<const N: usize>(textures: &Textures, used: &TextureUse, taps_max: 
         footprints[l] = Footprint::of(image, used.sampler, taps_max, right, down);
     }
     for l in 0..N {
-        let texel = averaged(textures, image, footprints[l], at[l], used.sampler);
+        let texel = averaged(texels, image, footprints[l], at[l], used.sampler);
         for k in 0..4 {
             out[k][l] = texel[k];
         }
@@ -175,7 +176,7 @@ impl Level {
         let size = |level: u32| [image.width, image.height].map(|side| (side >> level).max(1));
         let level = level.min(image.levels.max(1) - 1);
         let before = |level: u32| size(level)[0] * size(level)[1];
-        let first = image.first_texel + (image.first_level..level).map(before).sum::<u32>();
+        let first = (image.first_level..level).map(before).sum::<u32>();
         Self { first, size: size(level).map(|side| side as i32) }
     }
 
@@ -191,23 +192,23 @@ impl Level {
 }
 
 #[inline(always)]
-fn averaged(textures: &Textures, image: &Texture, footprint: Footprint, at: [f32; 2], sampler: u32) -> [f32; 4] {
+fn averaged(texels: &[[u16; 4]], image: &Texture, footprint: Footprint, at: [f32; 2], sampler: u32) -> [f32; 4] {
     let Footprint { taps, lod, axis } = footprint;
     if sampler & samplers::NEAREST != 0 {
-        return nearest(textures, Level::of(image, (lod + 0.5) as u32), at, sampler);
+        return nearest(texels, Level::of(image, (lod + 0.5) as u32), at, sampler);
     }
     let share_of_next = lod - (lod as u32) as f32;
     let level = Level::of(image, lod as u32);
     let levels = (level, (share_of_next > 0.0).then(|| (level.next(), share_of_next)));
     if taps < 2 {
-        return trilinear(textures, levels, at, sampler);
+        return trilinear(texels, levels, at, sampler);
     }
     let share = quick_recip(taps as f32);
     let mut sum = [0.0; 4];
     for tap in 0..taps {
         let along = (tap as f32 + 0.5) * share - 0.5;
         let place = [at[0] + axis[0] * along, at[1] + axis[1] * along];
-        let color = trilinear(textures, levels, place, sampler);
+        let color = trilinear(texels, levels, place, sampler);
         for k in 0..4 {
             sum[k] += color[k];
         }
@@ -218,14 +219,14 @@ fn averaged(textures: &Textures, image: &Texture, footprint: Footprint, at: [f32
 /// A place in a level, mixed with the next by its share.
 #[inline(always)]
 fn trilinear(
-    textures: &Textures,
+    texels: &[[u16; 4]],
     (level, next): (Level, Option<(Level, f32)>),
     at: [f32; 2],
     sampler: u32,
 ) -> [f32; 4] {
-    let color = bilinear(textures, level, at, sampler);
+    let color = bilinear(texels, level, at, sampler);
     match next {
-        Some((next, share)) => mix(color, bilinear(textures, next, at, sampler), share),
+        Some((next, share)) => mix(color, bilinear(texels, next, at, sampler), share),
         None => color,
     }
 }
@@ -246,7 +247,7 @@ fn half_log2(v: f32) -> f32 {
 }
 
 #[inline(always)]
-fn bilinear(textures: &Textures, Level { first, size }: Level, at: [f32; 2], sampler: u32) -> [f32; 4] {
+fn bilinear(texels: &[[u16; 4]], Level { first, size }: Level, at: [f32; 2], sampler: u32) -> [f32; 4] {
     let (mut low, mut high, mut share) = ([0; 2], [0; 2], [0.0; 2]);
     for k in 0..2 {
         let wrap = sampler >> (samplers::DOWN_SHIFT * k as u32) & samplers::WRAP_BITS;
@@ -256,18 +257,18 @@ fn bilinear(textures: &Textures, Level { first, size }: Level, at: [f32; 2], sam
         low[k] = texel_index(i, size[k], wrap);
         high[k] = texel_index(i + 1, size[k], wrap);
     }
-    let texel = |x: i32, y: i32| texel(textures, first + (y * size[0] + x) as u32);
+    let texel = |x: i32, y: i32| texel(texels, first + (y * size[0] + x) as u32);
     let upper = mix(texel(low[0], low[1]), texel(high[0], low[1]), share[0]);
     let lower = mix(texel(low[0], high[1]), texel(high[0], high[1]), share[0]);
     mix(upper, lower, share[1])
 }
 
-fn nearest(textures: &Textures, Level { first, size }: Level, at: [f32; 2], sampler: u32) -> [f32; 4] {
+fn nearest(texels: &[[u16; 4]], Level { first, size }: Level, at: [f32; 2], sampler: u32) -> [f32; 4] {
     let [x, y] = [0, 1].map(|k| {
         let wrap = sampler >> (samplers::DOWN_SHIFT * k as u32) & samplers::WRAP_BITS;
         texel_index(floor(wrapped(at[k], wrap) * size[k] as f32), size[k], wrap)
     });
-    texel(textures, first + (y * size[0] + x) as u32)
+    texel(texels, first + (y * size[0] + x) as u32)
 }
 
 /// A coordinate in 0 to 1.
@@ -297,8 +298,8 @@ fn texel_index(i: i32, size: i32, wrap: u32) -> i32 {
 }
 
 #[inline(always)]
-fn texel(textures: &Textures, index: u32) -> [f32; 4] {
-    textures.texels.get(index as usize).map_or([1.0; 4], |texel| texel.map(half_to_f32))
+fn texel(texels: &[[u16; 4]], index: u32) -> [f32; 4] {
+    texels.get(index as usize).map_or([1.0; 4], |texel| texel.map(half_to_f32))
 }
 
 /// Exact for finite halves: the bits moved into place, and the exponents' difference multiplied in.

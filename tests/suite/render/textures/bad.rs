@@ -157,11 +157,11 @@ fn chunks_beside_the_pixels_cost_nothing() {
         // Far too little for what they hold.
         let limits = Limits { memory_bytes: 16 << 20, ..Limits::default() };
         let plan = plan_of(&mesh, &[SkipKind::FineTextureLevels], &limits).unwrap();
-        assert_eq!(plan.surface.unwrap().textures.texels, want.texels);
+        assert_eq!(plan.surface.unwrap().textures.images[0].texels[..], want.images[0].texels[..]);
         cases += 1;
     }
     assert_eq!(cases, 4);
     // Chunks that the pixels need are kept.
     let clear = png(&[(b"IHDR", &header), (b"tRNS", &[0, 255]), (b"IDAT", &row)]);
-    assert_eq!(textures(&model_of(&clear)).texels[..2], [[0x3c00, 0x3c00, 0x3c00, 0], [0, 0, 0, 0x3c00]]);
+    assert_eq!(textures(&model_of(&clear)).images[0].texels[..2], [[0x3c00, 0x3c00, 0x3c00, 0], [0, 0, 0, 0x3c00]]);
 }

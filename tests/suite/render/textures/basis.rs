@@ -41,7 +41,7 @@ fn both_codecs_show_what_was_encoded() {
         let image = &textures.images[0];
         assert_eq!((image.width, image.height), (40, 40));
         // Linear, as textures are kept: letters are nearly white, and the ground has no blue.
-        let texel = |x: usize, y: usize| textures.texels[image.first_texel as usize + y * 40 + x].map(value);
+        let texel = |x: usize, y: usize| image.texels[y * 40 + x].map(value);
         let row = |y: usize| (0..40).map(|x| if texel(x, y)[2] > 0.15 { '#' } else { '.' }).collect::<String>();
         let rows: Vec<String> = (0..40).map(row).collect();
         assert_eq!(rows[3..11], BASIS);

@@ -129,7 +129,7 @@ fn fine_levels_are_kept_where_they_may_be_seen() {
         let plan = scenes::try_plan(&mesh, &spec, &Limits::default(), &Deadline::default(), keep).unwrap();
         let skipped = plan.skips.iter().any(|s| s.kind == SkipKind::FineTextureLevels);
         let textures = plan.surface.unwrap().textures;
-        assert_eq!(textures.texels.len() as u64, texels(&textures.images[0]));
+        assert_eq!(textures.texel_count(), texels(&textures.images[0]));
         (textures.images[0].first_level, skipped)
     };
     // The side of the triangle is about nine tenths of the picture's.

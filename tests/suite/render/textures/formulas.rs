@@ -53,12 +53,13 @@ fn texels_are_where_they_belong() {
 #[test]
 fn smaller_levels_blend_without_steps() {
     // One level red, the next blue, and so on: the mixture tells the level.
-    let mut textures = Textures::default();
+    let mut texels = Vec::new();
     for k in 0..5_u32 {
         let side = 16 >> k;
-        textures.texels.extend((0..side * side).map(|_| [ramp(k), 0, 0, ONE]));
+        texels.extend((0..side * side).map(|_| [ramp(k), 0, 0, ONE]));
     }
-    textures.images.push(Texture { width: 16, height: 16, levels: 5, ..bare() });
+    let image = Texture { width: 16, height: 16, first_level: 0, levels: 5, texels: texels.into() };
+    let textures = Textures { images: vec![image] };
     let mut look = ShadedMaterial::unlit([1.0; 4]);
     look.textures[slots::BASE] = TextureUse { texture: 0, ..TextureUse::NONE };
     let mut last = 0.0;
@@ -138,12 +139,8 @@ fn square_uvs(from: f32, to: f32) -> Vec<[f32; 2]> {
 }
 
 fn image(side: u32, texel: impl Fn(u32, u32) -> [u16; 4]) -> Textures {
-    let texels = (0..side).flat_map(|y| (0..side).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
-    Textures { texels, images: vec![Texture { width: side, height: side, ..bare() }] }
-}
-
-fn bare() -> Texture {
-    Texture { width: 0, height: 0, first_level: 0, levels: 1, first_texel: 0, padding: [0; 3] }
+    let texels: Vec<_> = (0..side).flat_map(|y| (0..side).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
+    Textures { images: vec![Texture { width: side, height: side, first_level: 0, levels: 1, texels: texels.into() }] }
 }
 
 /// k / 16, exactly.

@@ -112,7 +112,7 @@ fn dds_is_decoded() {
     dds.extend([0b0101_0000, 0x55, 0x55, 0x55]);
     let textures = crate::render::textures::levels::textures(&model_of(&dds));
     let (one, red_and_blue) = (0x3c00, |texel: [u16; 4]| [texel[0], texel[2]]);
-    let first: Vec<[u16; 2]> = textures.texels[..16].iter().map(|&texel| red_and_blue(texel)).collect();
+    let first: Vec<[u16; 2]> = textures.images[0].texels[..16].iter().map(|&texel| red_and_blue(texel)).collect();
     assert_eq!(first[..4], [[one, 0], [one, 0], [0, one], [0, one]]);
     assert!(first[4..].iter().all(|texel| *texel == [0, one]));
     // Of another kind.

@@ -351,7 +351,7 @@ pub fn textures() -> Textures {
 
 fn add(textures: &mut Textures, size: [u32; 2], first_level: u32, texel: impl Fn(u32, u32) -> [f32; 4]) {
     let levels = size[0].max(size[1]).ilog2() + 1;
-    let first_texel = textures.texels.len() as u32;
+    let mut texels = Vec::new();
     for level in first_level..levels {
         let [w, h] = size.map(|side| (side >> level).max(1));
         for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
@@ -361,11 +361,11 @@ fn add(textures: &mut Textures, size: [u32; 2], first_level: u32, texel: impl Fn
                 sum = std::array::from_fn(|k| sum[k] + texel(i, j)[k]);
             }
             let count = ((to[0] - from[0]) * (to[1] - from[1])) as f32;
-            textures.texels.push(sum.map(|v| half(v / count)));
+            texels.push(sum.map(|v| half(v / count)));
         }
     }
     let [width, height] = size;
-    textures.images.push(Texture { width, height, first_level, levels, first_texel, padding: [0; 3] });
+    textures.images.push(Texture { width, height, first_level, levels, texels: texels.into() });
 }
 
 /// For 2^-14 to 1: rounded down.
