@@ -6,9 +6,10 @@
 //!     cargo bench --bench browse                              # 200 meshes, 64 clients, 60 s, a quarter kept
 //!     cargo bench --bench browse -- --seconds 10 --style wire --backend gpu
 //!     cargo bench --bench browse -- --turning --mesh bunny.obj --seconds 5
+//!     cargo bench --bench browse -- --turning --mesh bunny.obj --style auto,flat,wire --clients 1
 //!
 //! With `--turning` each request has a camera of its own, so that each picture is drawn; the PNG encoder
-//! alone, on all cores, is measured in turns with that. Ends with a failure if an answer or a picture is
+//! alone, on all cores, is measured in turns with that. Several styles are asked for at random. Ends with a failure if an answer or a picture is
 //! wrong, or if a cap is not kept.
 
 // A tool for developers: giving up loudly is fine.
@@ -16,6 +17,7 @@
 
 mod served;
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::net::TcpStream;
 use std::process::ExitCode;
@@ -40,6 +42,7 @@ struct Options {
     clients: usize,
     seconds: f64,
     size_px: u32,
+    /// One or more, with commas.
     style: String,
     backend: String,
     is_turning: bool,
@@ -55,6 +58,8 @@ struct View {
 #[derive(Default)]
 struct Seen {
     times: Vec<Duration>,
+    /// Of the pictures that were drawn, milliseconds by stage, as Server-Timing has them.
+    stages: BTreeMap<String, Vec<f64>>,
     hits: usize,
     coalesced: usize,
     by_cpu: usize,
@@ -183,6 +188,7 @@ fn client<'a>(
             let began = Instant::now();
             let answer = get(&mut stream, address, &path);
             seen.times.push(began.elapsed());
+            seen.add_stages(&answer);
             seen.hits += usize::from(answer.header("x-cache") == Some("hit"));
             seen.coalesced += usize::from(answer.header("x-cache") == Some("coalesced"));
             seen.by_cpu += usize::from(answer.header("x-render-backend") == Some("cpu"));
@@ -198,12 +204,24 @@ fn client<'a>(
 impl Seen {
     fn and(mut self, other: Self) -> Self {
         self.times.extend(other.times);
+        for (name, times) in other.stages {
+            self.stages.entry(name).or_default().extend(times);
+        }
         self.hits += other.hits;
         self.coalesced += other.coalesced;
         self.by_cpu += other.by_cpu;
         self.wrong += other.wrong;
         self.refused += other.refused;
         self
+    }
+
+    /// Adds the stages of a picture that was drawn for this answer.
+    fn add_stages(&mut self, answer: &Answer) {
+        for entry in answer.header("server-timing").into_iter().flat_map(|timing| timing.split(',')) {
+            let Some((name, rest)) = entry.trim().split_once(";dur=") else { continue };
+            let duration = rest.split(';').next().and_then(|duration| duration.parse::<f64>().ok());
+            self.stages.entry(name.to_owned()).or_default().extend(duration);
+        }
     }
 }
 
@@ -224,6 +242,14 @@ fn print(options: &Options, seen: &Seen, memory_max: u64) {
         share(seen.coalesced),
         share(seen.by_cpu),
     );
+    let of_stage = |(name, times): (&String, &Vec<f64>)| {
+        let mut times = times.clone();
+        times.sort_unstable_by(f64::total_cmp);
+        let at = |part: f64| times.get((times.len() as f64 * part) as usize).copied().unwrap_or(0.0);
+        format!("{name} {:.2} ({:.2})", at(0.5), at(0.99))
+    };
+    let stages: Vec<String> = seen.stages.iter().map(of_stage).collect();
+    println!("stages, p50 (p99), ms: {}", stages.join(", "));
     println!("refused {}, wrong {}, largest memory {} MiB", seen.refused, seen.wrong, memory_max >> 20);
 }
 
@@ -237,9 +263,11 @@ fn views(options: &Options, address: &str, meshes: &[Vec<u8>]) -> Vec<View> {
         assert_eq!(answer.status, 201, "{}", String::from_utf8_lossy(&answer.body));
         let stored: serde_json::Value = serde_json::from_slice(&answer.body).expect("JSON");
         let url = stored["url"].as_str().expect("an address");
+        let mut styles = options.style.split(',').cycle();
         for camera in 0..CAMERAS {
             let turn = if options.is_turning { String::new() } else { format!("&camera.azimuth_deg={}", 20 * camera) };
-            let path = format!("{url}/render.png?size={}&style={}{turn}", options.size_px, options.style);
+            let path =
+                format!("{url}/render.png?size={}&style={}{turn}", options.size_px, styles.next().expect("a style"));
             all.push(View { path, picture: None });
         }
     }

@@ -419,7 +419,12 @@ fn upload_surface(
     surface: &SurfacePass<'_>,
 ) -> Result<(), DrawError> {
     let mesh = plan.mesh.as_ref();
-    buffers.upload(&gpu.handles, Slot::Attributes, &attributes(surface))?;
+    if surface.edge_masks.is_empty() {
+        let materials = &surface.triangle_materials;
+        supply(gpu, buffers, Slot::Attributes, Source::of(materials, mesh), &[bytemuck::cast_slice(materials)])?;
+    } else {
+        buffers.upload(&gpu.handles, Slot::Attributes, &attributes(surface))?;
+    }
     buffers.upload(&gpu.handles, Slot::Materials, bytemuck::cast_slice(&surface.materials))?;
     let face_normals = &surface.face_normals;
     supply(gpu, buffers, Slot::FaceNormals, Source::of(face_normals, mesh), &[bytemuck::cast_slice(face_normals)])?;
