@@ -1,18 +1,12 @@
 //! A job's GPU buffers, kept for the jobs that follow.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::handles::Handles;
 use super::params::Batch;
 use super::residents::Source;
 use crate::backend::DrawError;
 use crate::backend::gpu::pipelines::{SLOTS, Slot};
-
-/// Largest set of buffers that is kept, bytes. A larger one is freed after its job.
-const SET_BYTES_MAX: u64 = 256 << 20;
-
-/// Largest memory of all kept sets, bytes: on a software implementation it is the process's memory.
-const KEPT_BYTES_MAX: u64 = 2 * SET_BYTES_MAX;
 
 /// Longest input that is remembered, so that it is not written again where the next job has the same.
 const REMEMBERED_BYTES_MAX: usize = 8 << 10;
@@ -24,35 +18,46 @@ const SIZE_MIN: u64 = 256;
 ///
 /// The set used last is taken first. Workers take turns with jobs; if each had a set of its own,
 /// most of the memory would lie idle, and the first job of each would wait for more.
-#[derive(Default)]
-pub struct SpareBuffers(Mutex<Vec<Buffers>>);
+pub struct SpareBuffers {
+    sets: Mutex<Vec<Buffers>>,
+    bytes_max: u64,
+}
 
 impl SpareBuffers {
-    /// A set for a job.
-    pub fn take(&self) -> Buffers {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
+    /// No sets so far, and never more than `bytes_max`.
+    pub fn new(bytes_max: u64) -> Self {
+        Self { sets: Mutex::default(), bytes_max }
     }
 
-    /// Frees all sets.
-    pub fn clear(&self) {
-        let freed = std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner));
-        drop(freed);
+    /// A set for a job.
+    pub fn take(&self) -> Buffers {
+        self.lock().pop().unwrap_or_default()
+    }
+
+    /// Frees all sets. True if there were some.
+    pub fn clear(&self) -> bool {
+        let freed = std::mem::take(&mut *self.lock());
+        !freed.is_empty()
     }
 
     /// Memory of all sets, bytes.
     pub fn bytes(&self) -> u64 {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).iter().map(Buffers::bytes).sum()
+        self.lock().iter().map(Buffers::bytes).sum()
     }
 
-    /// A set that a finished job used. It is not kept where it, or all sets together, would be too
-    /// much.
+    /// A set that a finished job used. It is not kept where it takes more than half of the room, or all
+    /// sets together more than there is.
     pub fn give_back(&self, buffers: Buffers) {
-        let mut spare = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let kept: u64 = spare.iter().map(Buffers::bytes).sum();
+        let mut sets = self.lock();
+        let kept: u64 = sets.iter().map(Buffers::bytes).sum();
         let more = buffers.bytes();
-        if more <= SET_BYTES_MAX && kept + more <= KEPT_BYTES_MAX {
-            spare.push(buffers);
+        if more <= self.bytes_max / 2 && kept + more <= self.bytes_max {
+            sets.push(buffers);
         }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Vec<Buffers>> {
+        self.sets.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

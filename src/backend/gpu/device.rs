@@ -69,6 +69,11 @@ const SOFTWARE_PIPELINE_JOBS: u32 = 128;
 const RESIDENT_BYTES: u64 = 1 << 30;
 const RESIDENT_BYTES_SOFTWARE: u64 = 64 << 20;
 
+/// Memory for the buffers of jobs, kept for the next ones, bytes. A device with memory of its own keeps more: with
+/// too little, jobs at once of large meshes or pictures allocate theirs anew (docs/gpu-notes.md).
+const SPARE_BYTES: u64 = 512 << 20;
+const SPARE_BYTES_DISCRETE: u64 = 2 << 30;
+
 /// [`Gpu::alone_size_of_few`] of hardware: 4 px. Larger triangles are drawn by a workgroup each.
 const ALONE_SIZE_OF_FEW: i32 = 1024;
 
@@ -132,12 +137,13 @@ impl Gpu {
         tracing::debug!(name = info.name, "opened a device");
         let features = if int64_atomics { vec!["int64-atomics"] } else { vec![] };
         let is_software = info.device_type == wgpu::DeviceType::Cpu;
+        let is_discrete = info.device_type == wgpu::DeviceType::DiscreteGpu;
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
         let info = GpuInfo { name: info.name, driver, device_type: type_name(info.device_type), features };
         Ok(Self {
             handles: Handles { device, queue, limits, maps_storage, readbacks: Arc::default() },
             pipelines: Pipelines::kept_in(file),
-            spare_buffers: SpareBuffers::default(),
+            spare_buffers: SpareBuffers::new(if is_discrete { SPARE_BYTES_DISCRETE } else { SPARE_BYTES }),
             residents: ResidentBuffers::new(if is_software { RESIDENT_BYTES_SOFTWARE } else { RESIDENT_BYTES }),
             gangs: Gangs::default(),
             int64_atomics,
@@ -171,6 +177,11 @@ impl Gpu {
     /// renderer.
     pub fn spare_bytes(&self) -> u64 {
         self.spare_buffers.bytes() + self.handles.readbacks.bytes()
+    }
+
+    /// Frees what is kept for the next jobs. False if there was nothing.
+    pub(super) fn free_spare_memory(&self) -> bool {
+        self.residents.clear() | self.handles.readbacks.clear() | self.spare_buffers.clear()
     }
 
     /// Counts a job.

@@ -170,9 +170,7 @@ impl Renderer for GpuRenderer {
     fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
         match self.draw_once(plan, deadline) {
             // Perhaps there was no memory left.
-            Err(DrawError::Device(_)) if self.gpu.residents.clear() | self.gpu.handles.readbacks.clear() => {
-                self.draw_once(plan, deadline)
-            }
+            Err(DrawError::Device(_)) if self.gpu.free_spare_memory() => self.draw_once(plan, deadline),
             result => result,
         }
     }
