@@ -59,7 +59,7 @@ fn every_technique_is_measured_and_exact_wires_err_least() {
 }
 
 #[test]
-fn outlines_and_faces_are_measured_too() {
+fn outlines_faces_and_textures_are_measured_too() {
     let mut back_ends = back_ends(None);
     let mut measured = 0;
     for scene in SCENES.iter().filter(|scene| scene.is_quick && scene.family != Family::Wires) {
@@ -82,15 +82,20 @@ fn outlines_and_faces_are_measured_too() {
                 let ink = [Technique::Contour, Technique::Hull].map(|technique| at(technique).ink.unwrap());
                 assert!(ink.iter().all(|ink| (ink - 1.0).abs() < 0.02), "{ink:?}");
             }
+            Family::Textures => {
+                let [error, pixels] = [rmse(Technique::Texture), at(Technique::Texture).pixels as f64];
+                println!("textures: {error} of {pixels} pixels");
+                assert!(error < 6.0 && pixels > 5000.0, "{error} of {pixels} pixels");
+            }
             _ => {
                 assert!(rmse(Technique::FaceNormals) < 0.4, "{}", rmse(Technique::FaceNormals));
                 assert!(rmse(Technique::DerivativeNormals) < 12.0, "{}", rmse(Technique::DerivativeNormals));
             }
         }
-        assert_eq!(rows.len(), 2 * 2 * SAMPLES.len());
+        assert_eq!(rows.len(), 2 * scene.family.techniques().len() * SAMPLES.len());
         measured += 1;
     }
-    assert_eq!(measured, 2);
+    assert_eq!(measured, 3);
 }
 
 #[test]

@@ -7,13 +7,16 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use super::BASELINE;
+use super::techniques::Technique;
 
 /// Kinds of back-ends, and which of the measured ones stand for them.
 const KINDS: [(&str, &str); 2] = [("cpu", "cpu-1"), ("gpu", "gpu")];
 
 /// From the document that `json.rs` writes, so that a table can be made without measuring again.
 pub fn table(document: &Value) -> String {
-    let rows = document["rows"].as_array().expect("rows");
+    // Textures are filtered in one way: no technique among which to choose.
+    let is_choice = |row: &&Value| row["technique"] != Technique::Texture.name();
+    let rows: Vec<&Value> = document["rows"].as_array().expect("rows").iter().filter(is_choice).collect();
     let megapixels = document["size_px"].as_f64().expect("size_px").powi(2) / 1e6;
     let kilotriangles = |scene: &Value| {
         let scenes = document["scenes"].as_array().expect("scenes");
@@ -23,14 +26,17 @@ pub fn table(document: &Value) -> String {
     let mut made: Vec<String> = Vec::new();
     for (kind, back_end) in KINDS {
         let mut seen: Vec<(&Value, &Value)> = Vec::new();
-        for row in rows.iter().filter(|row| row["backend"] == back_end) {
+        for &row in rows.iter().filter(|row| row["backend"] == back_end) {
             let key = (&row["technique"], &row["samples"]);
             if seen.contains(&key) {
                 continue;
             }
             seen.push(key);
-            let alike: Vec<&Value> =
-                rows.iter().filter(|r| r["backend"] == back_end && (&r["technique"], &r["samples"]) == key).collect();
+            let alike: Vec<&Value> = rows
+                .iter()
+                .copied()
+                .filter(|r| r["backend"] == back_end && (&r["technique"], &r["samples"]) == key)
+                .collect();
             let error = alike.iter().map(|r| r["rmse"].as_f64().expect("rmse")).fold(0.0, f64::max);
             let points: Vec<[f64; 3]> = alike
                 .iter()

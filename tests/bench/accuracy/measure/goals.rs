@@ -26,7 +26,7 @@ enum By {
     Suite(&'static str),
 }
 
-const GOALS: [Goal; 10] = [
+const GOALS: [Goal; 11] = [
     Goal {
         number: 1,
         measure: "isolated exact lines, 0.25 to 16 px wide, all angles, 64 places within a pixel",
@@ -81,6 +81,12 @@ const GOALS: [Goal; 10] = [
         measure: "exact wires against the next best technique",
         goal: "2x faster at equal error, or 5x less error at equal time",
         by: By::Bench(leads),
+    },
+    Goal {
+        number: 13,
+        measure: "textures at a slant against the mean over each pixel",
+        goal: "at most a third of trilinear filtering's error",
+        by: By::Suite("accuracy::textures"),
     },
 ];
 
@@ -169,8 +175,8 @@ fn leads(rows: &[Row]) -> String {
     })
 }
 
-/// Five sentences that explain the plot with the numbers of these rows.
-pub fn sentences(rows: &[Row]) -> [String; 5] {
+/// Six sentences that explain the plot with the numbers of these rows.
+pub fn sentences(rows: &[Row]) -> [String; 6] {
     let at = |technique, samples| point(rows, Family::Wires, technique, "cpu-1", samples);
     let least = SAMPLES[0];
     let [exact_1, exact, fwidth_1, fwidth] = [
@@ -205,6 +211,10 @@ pub fn sentences(rows: &[Row]) -> [String; 5] {
             error(Family::Faces, Technique::FaceNormals),
             error(Family::Faces, Technique::DerivativeNormals),
             time(Family::Faces, Technique::DerivativeNormals) / time(Family::Faces, Technique::FaceNormals),
+        ),
+        format!(
+            "Textures err by {:.2}/255 where a pixel shows one face alone, against the mean of the texture over the pixel.",
+            error(Family::Textures, Technique::Texture),
         ),
     ]
 }

@@ -77,9 +77,9 @@ fn schema() -> Value {
         "size_px": "columns and rows of every picture",
         "runs": "timed rounds",
         "scenes[].family": "wires and outlines: errors of coverage, in linear light; faces: of encoded colour where a pixel shows one face \
-                            alone; pictures: of encoded colour in all pixels",
+                            alone; pictures: of encoded colour in all pixels; textures: of encoded colour where a pixel shows one face alone",
         "scenes[].triangles": "after triangulation",
-        "rows[].technique": "wire.method, outline.method or surface.normals of the request",
+        "rows[].technique": "wire.method, outline.method or surface.normals of the request; texture: filtering, without light",
         "rows[].backend": "cpu-N with N threads, or gpu",
         "rows[].samples": "image.samples",
         "rows[].thickness": "wire.thickness or outline.thickness (px), chosen so that the technique is nominally as wide as the truth",

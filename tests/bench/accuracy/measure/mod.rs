@@ -15,6 +15,7 @@ pub mod scenes;
 pub mod summary;
 pub mod table;
 pub mod techniques;
+pub mod textured;
 pub mod truths;
 
 use std::sync::Arc;

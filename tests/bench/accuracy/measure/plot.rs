@@ -22,7 +22,11 @@ struct Panel {
 
 const PANELS: [Panel; 2] = [
     Panel { title: "wires", families: &[Family::Wires], x: [58.0, 372.0] },
-    Panel { title: "outlines and flat faces", families: &[Family::Outlines, Family::Faces], x: [410.0, 704.0] },
+    Panel {
+        title: "outlines, flat faces, textures",
+        families: &[Family::Outlines, Family::Faces, Family::Textures],
+        x: [410.0, 704.0],
+    },
 ];
 
 /// Both panels share the range of errors. Colours are told apart on white and on black.
@@ -208,6 +212,7 @@ fn words(technique: Technique) -> &'static str {
     match technique {
         Technique::FaceNormals => "face normals",
         Technique::DerivativeNormals => "derivative normals",
+        Technique::Texture => "textures",
         other => other.name(),
     }
 }
@@ -221,6 +226,7 @@ fn color(technique: Technique) -> &'static str {
         Technique::Hull => "#d9730d",
         Technique::FaceNormals => "#2da15f",
         Technique::DerivativeNormals => "#c545a8",
+        Technique::Texture => "#a8800c",
     }
 }
 

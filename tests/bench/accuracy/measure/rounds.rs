@@ -129,6 +129,7 @@ fn truths(scene: &Scene, effort: Effort, mesh: &Mesh, baseline: &Case<'_>, cases
     match scene.family {
         Family::Wires => vec![of(Technique::Wire(WireMethod::Exact), &baseline.plan); techniques.len()],
         Family::Faces | Family::Pictures => vec![of(Technique::FaceNormals, &cases[0].plan); techniques.len()],
+        Family::Textures => vec![of(Technique::Texture, &cases[0].plan)],
         // Each in its own view: room is left for what sticks out.
         Family::Outlines => {
             let outline = |&technique: &Technique| {

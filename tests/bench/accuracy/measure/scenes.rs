@@ -14,6 +14,7 @@ use meshsnap::spec::Spec;
 
 use super::meshes;
 use super::techniques::Family;
+use super::textured;
 use crate::support::shapes;
 
 /// A scene, measured with each technique of its family.
@@ -36,9 +37,14 @@ pub struct Scene {
 enum Source {
     /// Made for pictures of so many pixels per side.
     Made(fn(u32) -> String),
+    /// Made with a texture, as GLB.
+    Textured(fn() -> Vec<u8>),
     /// A file of the shared models, and what takes its place where it is not there.
     Model(&'static str, fn(u32) -> String),
 }
+
+/// From a little above, along a floor.
+const ALONG: &[(&str, &str)] = &[("camera.eye", "0.3,1,3"), ("camera.target", "0,0,-1"), ("camera.fov_deg", "60")];
 
 const POLYGONS: &[(&str, &str)] = &[("wire.edges", "polygons")];
 
@@ -58,6 +64,8 @@ pub const SCENES: &[Scene] = &[
     quick(solid("gear faces", Family::Faces, Source::Made(|_| shapes::gear(14)), 0.0)),
     solid("torus faces", Family::Faces, Source::Made(|_| shapes::torus(48)), 0.0),
     solid("rings, whole picture", Family::Pictures, Source::Made(|_| meshes::rings()), 0.0),
+    quick(Scene { keys: ALONG, ..solid("floor at a slant", Family::Textures, Source::Textured(textured::floor), 0.0) }),
+    solid("textured torus", Family::Textures, Source::Textured(textured::torus), 0.0),
 ];
 
 /// Scenes that no table is made from: what a table says of techniques must hold for these too.
@@ -107,6 +115,7 @@ impl Scene {
     fn bytes(&self, size_px: u32) -> Vec<u8> {
         match self.source {
             Source::Made(made) => made(size_px).into_bytes(),
+            Source::Textured(made) => made(),
             Source::Model(file, instead) => {
                 std::fs::read(models().join(file)).unwrap_or_else(|_| instead(size_px).into_bytes())
             }
@@ -124,7 +133,7 @@ impl Scene {
     /// A description for readers of the report.
     pub fn about(&self) -> String {
         let what = match self.source {
-            Source::Made(_) => "made by the benchmark".to_owned(),
+            Source::Made(_) | Source::Textured(_) => "made by the benchmark".to_owned(),
             Source::Model(file, _) if self.missing_model().is_none() => file.to_owned(),
             Source::Model(file, _) => format!("a made mesh in place of {file}, which is not there"),
         };
@@ -133,8 +142,10 @@ impl Scene {
 
     /// A request for the scene, `keys` over its own.
     pub fn spec(&self, size_px: u32, keys: &[(&str, String)]) -> Spec {
-        let view = if self.is_flat { "front" } else { "iso" };
-        let mut all = vec![("size".to_owned(), size_px.to_string()), ("view".into(), view.into())];
+        let mut all = vec![("size".to_owned(), size_px.to_string())];
+        if self.keys.iter().all(|(key, _)| *key != "camera.eye") {
+            all.push(("view".into(), if self.is_flat { "front" } else { "iso" }.into()));
+        }
         if self.is_flat {
             all.push(("camera.projection".into(), "orthographic".into()));
             all.push(("camera.height".into(), size_px.to_string()));

@@ -29,6 +29,8 @@ pub enum Family {
     Faces,
     /// The same, of all pixels, so that anti-aliasing counts.
     Pictures,
+    /// Textured faces without light. Error: of colour, where a pixel shows one face alone.
+    Textures,
 }
 
 /// A way to draw.
@@ -39,9 +41,10 @@ pub enum Technique {
     Hull,
     FaceNormals,
     DerivativeNormals,
+    Texture,
 }
 
-use Technique::{Contour, DerivativeNormals, FaceNormals, Hull, Wire};
+use Technique::{Contour, DerivativeNormals, FaceNormals, Hull, Texture, Wire};
 
 static WIRES: LazyLock<Vec<Technique>> = LazyLock::new(|| WIRE_METHODS.iter().map(|row| Wire(row.method)).collect());
 
@@ -51,6 +54,7 @@ impl Family {
             Self::Wires => &WIRES,
             Self::Outlines => &[Contour, Hull],
             Self::Faces | Self::Pictures => &[FaceNormals, DerivativeNormals],
+            Self::Textures => &[Texture],
         }
     }
 
@@ -60,12 +64,13 @@ impl Family {
             Self::Outlines => "outlines",
             Self::Faces => "faces",
             Self::Pictures => "pictures",
+            Self::Textures => "textures",
         }
     }
 }
 
 impl Technique {
-    /// As requests name it.
+    /// As requests name it; `texture` is the one way of filtering.
     pub fn name(self) -> &'static str {
         match self {
             Wire(method) => method.info().name,
@@ -73,6 +78,7 @@ impl Technique {
             Hull => "hull",
             FaceNormals => "face",
             DerivativeNormals => "derivative",
+            Texture => "texture",
         }
     }
 
@@ -81,7 +87,7 @@ impl Technique {
     pub fn thickness(self, width_px: f64, height_px: f64) -> f64 {
         let unit = if let Wire(method) = self { method.info().unit } else { ThicknessUnit::Pixels };
         match (self, unit) {
-            (FaceNormals | DerivativeNormals, _) => 0.0,
+            (FaceNormals | DerivativeNormals | Texture, _) => 0.0,
             (_, ThicknessUnit::Pixels) => width_px,
             (_, ThicknessUnit::Derivatives) => 0.5 * (width_px - width_px.min(1.0)),
             // Both triangles of an edge draw the wire.
@@ -110,6 +116,7 @@ impl Technique {
                 ("surface.color", "c08040"),
                 ("background", "fff"),
             ],
+            Texture => vec![("style", "unlit"), ("background", "fff")],
         };
         if matches!(self, Contour | Hull) {
             keys.extend([("outline.method", self.name()), ("outline.unit", "px"), ("outline.color", "fff")]);
@@ -128,7 +135,7 @@ impl Technique {
                 }
             }
             Contour | Hull => keys.push(("outline.thickness", thickness.to_string())),
-            FaceNormals | DerivativeNormals => {}
+            FaceNormals | DerivativeNormals | Texture => {}
         }
         keys.push(("samples", samples.to_string()));
         keys

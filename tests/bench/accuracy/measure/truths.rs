@@ -4,6 +4,7 @@ use meshsnap::image::Image;
 use meshsnap::plan::DrawPlan;
 
 use super::techniques::{Family, Technique};
+use super::textured;
 use crate::oracle::flip::Seen;
 use crate::oracle::lines::coverage::ink;
 use crate::oracle::screen::{Screen, is_front};
@@ -62,13 +63,17 @@ pub struct Apart {
 
 impl Truth {
     /// Of a technique's scene. `lines` is a plan whose line pass has the wanted width: of exact
-    /// wires, or of a contour; for faces, the technique's own plan.
+    /// wires, or of a contour; for faces and textures, the technique's own plan.
     pub fn new(family: Family, technique: Technique, lines: &DrawPlan<'_>, width_px: f64, points: u32) -> Self {
         let size = [lines.width_px, lines.height_px];
         let (kind, pixels, counts) = match (family, technique) {
             (Family::Faces, _) => {
                 let (pixels, counts) = whole_pixels(lines);
                 (Kind::Color, pixels, counts)
+            }
+            (Family::Textures, _) => {
+                let (pixels, counts) = textured::pixels(lines, points);
+                (Kind::Color, pixels, Some(counts))
             }
             (Family::Pictures, _) => (Kind::Color, whole_picture(lines, points), None),
             (_, Technique::Hull) => {
