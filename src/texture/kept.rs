@@ -7,8 +7,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::texture::mips::Reading;
 use crate::texture::{Texture, TextureError, Textures, fit};
 
-/// Most texels that are kept: those of two pictures at their largest.
-const TEXELS_MAX: u64 = 2 * fit::TEXELS_MAX;
+/// Most memory that is kept, bytes: the texels of two pictures at their largest.
+const BYTES_MAX: u64 = 2 * fit::TEXELS_MAX * size_of::<[u16; 4]>() as u64;
+
+/// Memory of an image beside its texels, bytes: its entry here and its heap block, a little more.
+const ENTRY_BYTES: u64 = 192;
 
 /// Most sets of textures that are known. Each is one buffer of a GPU.
 const SETS_MAX: usize = 16;
@@ -26,8 +29,8 @@ pub struct KeptTextures(Mutex<Kept>);
 #[derive(Debug, Default)]
 struct Kept {
     images: BTreeMap<ImageKey, Entry>,
-    /// Texels of all images.
-    texels: u64,
+    /// Memory of all images.
+    bytes: u64,
     /// Last used last.
     sets: Vec<Set>,
     /// Counts uses.
@@ -59,9 +62,17 @@ impl KeptTextures {
         })
     }
 
-    /// Keeps a decoded image, in place of one that begins with a coarser level.
-    pub fn keep(&self, key: ImageKey, decoded: &Decoded) {
-        self.with(|kept| kept.keep(key, decoded));
+    /// Keeps decoded images, in place of those that begin with a coarser level. Where another picture has kept as fine
+    /// an image in the meantime, it takes the place of the given one.
+    pub fn keep<'a>(&self, images: impl Iterator<Item = (ImageKey, &'a mut Decoded)>) {
+        self.with(|kept| {
+            let mut is_changed = false;
+            images.for_each(|(key, decoded)| is_changed |= kept.keep(key, decoded));
+            if is_changed {
+                kept.make_room();
+                kept.drop_stale_sets();
+            }
+        });
     }
 
     /// The same textures as one object for all pictures that have them. So a GPU knows that it has them.
@@ -73,20 +84,21 @@ impl KeptTextures {
                 None => Set { keys, textures: Arc::new(textures) },
             };
             let shared = Arc::clone(&set.textures);
-            if kept.sets.len() == SETS_MAX {
-                kept.sets.remove(0);
+            if known.is_some() || kept.is_current(&set) {
+                if kept.sets.len() == SETS_MAX {
+                    kept.sets.remove(0);
+                }
+                kept.sets.push(set);
             }
-            kept.sets.push(set);
-            kept.drop_stale_sets();
             shared
         })
     }
 
-    /// Memory of the images, bytes.
+    /// Memory of the images and of the lists of sets, bytes.
     pub fn bytes(&self) -> u64 {
         self.with(|kept| {
-            let lists = kept.sets.iter().map(|set| size_of_val(&set.textures.images[..]) as u64).sum::<u64>();
-            kept.texels * size_of::<[u16; 4]>() as u64 + lists
+            let of_set = |set: &Set| size_of_val(&set.textures.images[..]) + size_of_val(&set.keys[..]);
+            kept.bytes + kept.sets.iter().map(|set| of_set(set) as u64).sum::<u64>()
         })
     }
 
@@ -96,39 +108,50 @@ impl KeptTextures {
 }
 
 impl Kept {
-    fn keep(&mut self, key: ImageKey, decoded: &Decoded) {
-        let first_level = decoded.as_ref().map_or(0, |texture| texture.first_level);
-        if self.images.get(&key).is_some_and(|entry| entry.is_enough(first_level)) {
-            return;
+    /// True if the image was not kept before.
+    fn keep(&mut self, key: ImageKey, decoded: &mut Decoded) -> bool {
+        let first_level = decoded.as_ref().map_or(u32::MAX, |texture| texture.first_level);
+        if let Some(entry) = self.images.get(&key).filter(|entry| entry.is_enough(first_level)) {
+            *decoded = entry.decoded.clone();
+            return false;
         }
-        self.remove(key);
         self.now += 1;
         let entry = Entry { decoded: decoded.clone(), used: self.now };
-        self.texels += entry.texels();
-        self.images.insert(key, entry);
-        while self.texels > TEXELS_MAX {
-            let Some(oldest) = self.images.iter().min_by_key(|(_, entry)| entry.used).map(|(key, _)| *key) else {
-                break;
-            };
-            self.remove(oldest);
-        }
-        self.drop_stale_sets();
+        self.bytes += entry.bytes();
+        self.bytes -= self.images.insert(key, entry).map_or(0, |before| before.bytes());
+        true
     }
 
-    fn remove(&mut self, key: ImageKey) {
-        self.texels -= self.images.remove(&key).map_or(0, |entry| entry.texels());
+    fn make_room(&mut self) {
+        if self.bytes <= BYTES_MAX {
+            return;
+        }
+        let mut oldest_first: Vec<(u64, ImageKey)> =
+            self.images.iter().map(|(key, entry)| (entry.used, *key)).collect();
+        oldest_first.sort_unstable();
+        for (_, key) in oldest_first {
+            if self.bytes <= BYTES_MAX {
+                break;
+            }
+            self.bytes -= self.images.remove(&key).map_or(0, |entry| entry.bytes());
+        }
     }
 
     /// Drops sets with an image that is not kept any more, which would hold its memory.
     fn drop_stale_sets(&mut self) {
-        let is_kept = |key: &ImageKey, texture: &Texture| match self.images.get(key).map(|entry| &entry.decoded) {
+        let mut sets = std::mem::take(&mut self.sets);
+        sets.retain(|set| self.is_current(set));
+        self.sets = sets;
+    }
+
+    /// True if all images of a set are kept.
+    fn is_current(&self, set: &Set) -> bool {
+        let is_kept = |(key, texture): (&ImageKey, &Texture)| match self.images.get(key).map(|entry| &entry.decoded) {
             Some(Ok(kept)) => kept.texels.is_of(&texture.texels),
-            Some(Err(_)) => true,
+            Some(Err(_)) => texture.texels.is_empty(),
             None => false,
         };
-        let mut sets = std::mem::take(&mut self.sets);
-        sets.retain(|set| set.keys.iter().zip(&set.textures.images).all(|(key, texture)| is_kept(key, texture)));
-        self.sets = sets;
+        set.keys.iter().zip(&set.textures.images).all(is_kept)
     }
 }
 
@@ -137,8 +160,12 @@ impl Entry {
         self.decoded.as_ref().map_or(true, |texture| texture.first_level <= first_level)
     }
 
-    fn texels(&self) -> u64 {
-        self.decoded.as_ref().map_or(0, |texture| texture.texels.len() as u64)
+    fn bytes(&self) -> u64 {
+        let own = match &self.decoded {
+            Ok(texture) => size_of_val(&texture.texels[..]),
+            Err(fault) => fault.to_string().len(),
+        };
+        ENTRY_BYTES + own as u64
     }
 }
 
@@ -154,6 +181,10 @@ mod tests {
         Ok(Texture { width: side, height: side, first_level, levels: mips::count(side, side), texels })
     }
 
+    fn keep(kept: &KeptTextures, key: ImageKey, mut decoded: Decoded) {
+        kept.keep(std::iter::once((key, &mut decoded)));
+    }
+
     fn first_level(kept: &KeptTextures, key: ImageKey, wanted: u32) -> Option<u32> {
         kept.find(key, wanted).map(|decoded| decoded.unwrap().first_level)
     }
@@ -161,32 +192,38 @@ mod tests {
     #[test]
     fn an_image_is_found_where_it_is_fine_enough() {
         let kept = KeptTextures::default();
-        kept.keep(COLOR(0), &decoded(16, 2));
+        keep(&kept, COLOR(0), decoded(16, 2));
         assert_eq!([1, 2, 3].map(|wanted| first_level(&kept, COLOR(0), wanted)), [None, Some(2), Some(2)]);
         assert!(kept.find((0, Reading::plain(false)), 2).is_none(), "it was read as a colour");
-        kept.keep(COLOR(0), &decoded(16, 3));
+        keep(&kept, COLOR(0), decoded(16, 3));
         assert_eq!(first_level(&kept, COLOR(0), 2), Some(2), "a coarser one does not take its place");
-        kept.keep(COLOR(0), &decoded(16, 0));
+        keep(&kept, COLOR(0), decoded(16, 0));
         assert_eq!(first_level(&kept, COLOR(0), 1), Some(0));
-        assert_eq!(kept.bytes(), 8 * mips::texels(16, 16, 0));
-        // A fault is one for every level.
+        assert_eq!(kept.bytes(), ENTRY_BYTES + 8 * mips::texels(16, 16, 0));
+        // Of two that were decoded at once, the second is given the first.
+        let mut second = decoded(16, 1);
+        kept.keep(std::iter::once((COLOR(0), &mut second)));
+        assert_eq!(second.unwrap().first_level, 0);
+        // A fault is one for every level, and does not replace what was decoded.
         let fault = TextureError::Broken("image 1 is broken".into());
-        kept.keep(COLOR(1), &Err(fault.clone()));
+        keep(&kept, COLOR(1), Err(fault.clone()));
         assert_eq!(kept.find(COLOR(1), 0).unwrap().unwrap_err(), fault);
+        keep(&kept, COLOR(0), Err(fault));
+        assert_eq!(first_level(&kept, COLOR(0), 0), Some(0));
     }
 
     #[test]
     fn the_least_recently_used_makes_room() {
         let kept = KeptTextures::default();
-        // 5.6 million texels each: four fit.
+        // 44.7 MB each: four fit.
         for image in 0..4 {
-            kept.keep(COLOR(image), &decoded(2048, 0));
+            keep(&kept, COLOR(image), decoded(2048, 0));
         }
         assert!(kept.find(COLOR(0), 0).is_some());
-        kept.keep(COLOR(4), &decoded(2048, 0));
+        keep(&kept, COLOR(4), decoded(2048, 0));
         let found: Vec<u32> = (0..5).filter(|&image| kept.find(COLOR(image), 0).is_some()).collect();
         assert_eq!(found, [0, 2, 3, 4]);
-        assert_eq!(kept.bytes(), 4 * 8 * mips::texels(2048, 2048, 0));
+        assert_eq!(kept.bytes(), 4 * (ENTRY_BYTES + 8 * mips::texels(2048, 2048, 0)));
     }
 
     #[test]
@@ -198,12 +235,12 @@ mod tests {
             kept.shared(keys, Textures { images })
         };
         for image in 0..2 {
-            kept.keep(COLOR(image), &decoded(16, 1));
+            keep(&kept, COLOR(image), decoded(16, 1));
         }
         let (both, one) = (set(&kept, &[0, 1]), set(&kept, &[1]));
         assert!(Arc::ptr_eq(&both, &set(&kept, &[0, 1])) && Arc::ptr_eq(&one, &set(&kept, &[1])));
         // From a finer level on it is another set, and those with what was there before are not held.
-        kept.keep(COLOR(0), &decoded(16, 0));
+        keep(&kept, COLOR(0), decoded(16, 0));
         assert_eq!(Arc::strong_count(&both), 1);
         assert!(!Arc::ptr_eq(&both, &set(&kept, &[0, 1])));
         assert!(Arc::ptr_eq(&one, &set(&kept, &[1])));

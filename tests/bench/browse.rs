@@ -9,7 +9,8 @@
 //!     cargo bench --bench browse -- --turning --mesh bunny.obj --style auto,flat,wire --clients 1
 //!
 //! With `--turning` each request has a camera of its own, so that each picture is drawn; the PNG encoder
-//! alone, on all cores, is measured in turns with that. Several styles are asked for at random. Ends with a failure if an answer or a picture is
+//! alone, on all cores, is measured in turns with that. Up to four styles take turns with the
+//! cameras; the encoder has a picture of the first. Ends with a failure if an answer or a picture is
 //! wrong, or if a cap is not kept.
 
 // A tool for developers: giving up loudly is fine.
@@ -264,6 +265,7 @@ fn views(options: &Options, address: &str, meshes: &[Vec<u8>]) -> Vec<View> {
         let stored: serde_json::Value = serde_json::from_slice(&answer.body).expect("JSON");
         let url = stored["url"].as_str().expect("an address");
         let mut styles = options.style.split(',').cycle();
+        assert!(options.style.split(',').count() <= CAMERAS, "at most {CAMERAS} styles, one for each camera");
         for camera in 0..CAMERAS {
             let turn = if options.is_turning { String::new() } else { format!("&camera.azimuth_deg={}", 20 * camera) };
             let path =

@@ -72,7 +72,7 @@ const RESIDENT_BYTES_SOFTWARE: u64 = 64 << 20;
 /// Memory for the buffers of jobs, kept for the next ones, bytes. A device with memory of its own keeps more: with
 /// too little, jobs at once of large meshes or pictures allocate theirs anew (docs/gpu-notes.md).
 const SPARE_BYTES: u64 = 512 << 20;
-const SPARE_BYTES_DISCRETE: u64 = 2 << 30;
+const SPARE_BYTES_DISCRETE: u64 = 1 << 30;
 
 /// [`Gpu::alone_size_of_few`] of hardware: 4 px. Larger triangles are drawn by a workgroup each.
 const ALONE_SIZE_OF_FEW: i32 = 1024;

@@ -38,10 +38,10 @@ pub fn shaded_material(
     Ok(material)
 }
 
-/// Takes textures from a material, those of these indices. It looks as if its file did not mention them.
+/// Takes textures from a material, those of these indices, which are in order. It looks as if its file did not mention them.
 pub fn remove_textures(material: &mut ShadedMaterial, mesh: &Mesh, indices: &[u32]) {
     for place in 0..material.textures.len() {
-        if indices.contains(&material.textures[place].texture) {
+        if indices.binary_search(&material.textures[place].texture).is_ok() {
             remove_texture(material, mesh, place);
         }
     }

@@ -163,9 +163,9 @@ impl<'a> TextureLoader<'a> {
             missing.push(is_missing.then_some(Decoding { image, want, first_level, place }));
         }
         decode_all(missing, &batches, deadline)?;
-        let decoded: Vec<Decoded> = decoded.into_iter().flatten().collect();
-        for (want, decoded) in wanted.iter().zip(&decoded) {
-            kept.inspect(|kept| kept.keep(want.key(), decoded));
+        let mut decoded: Vec<Decoded> = decoded.into_iter().flatten().collect();
+        if let Some(kept) = kept {
+            kept.keep(wanted.iter().map(Wanted::key).zip(&mut decoded));
         }
         Ok(LoadedTextures::new(&wanted, decoded, (&first_levels, &finest), kept, faults))
     }
