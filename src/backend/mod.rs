@@ -95,7 +95,10 @@ pub enum DrawError {
     /// The device is lost; a new one may work.
     #[error("the GPU was lost: {0}")]
     DeviceLost(String),
-    /// The device refused the work: out of memory, or a plan beyond its limits.
+    /// The plan is beyond the device's limits; trying again is of no use.
+    #[error("the GPU cannot draw this: {0}")]
+    BeyondGpu(String),
+    /// The device refused the work, perhaps for lack of memory.
     #[error("the GPU cannot draw this: {0}")]
     Device(String),
 }

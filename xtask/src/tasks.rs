@@ -109,7 +109,10 @@ pub fn features() -> Result {
         run(cargo(&[&check[..], &["--no-default-features", "--features", feature]].concat()))?;
     }
     run(cargo(&[&check[..], &["--all-features"]].concat()))?;
-    run(cargo(&["test", "--locked", "--features", "otel", "--test", "suite", "--", "jobs::traces"]))
+    let mut traces = cargo(&["test", "--locked", "--features", "otel", "--test", "suite", "--", "jobs::traces"]);
+    // These are few tests: nearly all of the time goes to the compiler.
+    traces.env("CARGO_PROFILE_DEV_OPT_LEVEL", "0");
+    run(traces)
 }
 
 /// Other systems that the program is checked for.
@@ -165,7 +168,10 @@ pub fn package(options: &[&str]) -> Result {
     if let Some(stray) = files.lines().find(is_stray) {
         return Err(format!("the archive would hold {stray}: see `exclude` in Cargo.toml"));
     }
-    run(cargo(&[&["package"], &of_crate[..], options].concat()))?;
+    let mut package = cargo(&[&["package"], &of_crate[..], options].concat());
+    // It is built, and nothing of it runs.
+    package.env("CARGO_PROFILE_DEV_OPT_LEVEL", "0");
+    run(package)?;
     let folder = root().join("target/package");
     let archives = std::fs::read_dir(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let archives = archives.flatten().filter(|entry| entry.path().extension().is_some_and(|e| e == "crate"));

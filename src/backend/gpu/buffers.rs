@@ -205,7 +205,7 @@ impl Buffers {
         use wgpu::BufferUsages as U;
         let limit = gpu.limits.max_buffer_size;
         if size > limit {
-            return Err(DrawError::Device(format!("the picture has {size} bytes, and the GPU's limit is {limit}")));
+            return Err(DrawError::BeyondGpu(format!("the picture has {size} bytes, and the GPU's limit is {limit}")));
         }
         let written = if gpu.maps_storage { U::STORAGE } else { U::empty() };
         if self.staging.is_none() {
@@ -243,7 +243,7 @@ impl Buffers {
 fn check_size(gpu: &Handles, size: u64) -> Result<u64, DrawError> {
     let limit = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
     if size > limit {
-        return Err(DrawError::Device(format!("it needs a buffer of {size} bytes, and the GPU's limit is {limit}")));
+        return Err(DrawError::BeyondGpu(format!("it needs a buffer of {size} bytes, and the GPU's limit is {limit}")));
     }
     Ok(limit)
 }

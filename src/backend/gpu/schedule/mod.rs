@@ -316,7 +316,7 @@ impl Schedule {
         // Consecutive dispatches with equal parameters share a batch.
         if self.batches.last() != Some(&batch) {
             if self.batches.len() == BATCHES_MAX {
-                return Err(DrawError::Device(format!("it takes more than {BATCHES_MAX} dispatches")));
+                return Err(DrawError::BeyondGpu(format!("it takes more than {BATCHES_MAX} dispatches")));
             }
             self.batches.push(batch);
         }
@@ -377,6 +377,6 @@ mod tests {
         let few = &triangles[..1];
         assert!(schedule(few, Case { passes: 4096, ..LARGEST }).is_ok());
         let refused = schedule(few, Case { passes: 16_384, ..LARGEST }).unwrap_err();
-        assert!(matches!(&refused, DrawError::Device(reason) if reason.contains("dispatches")), "{refused}");
+        assert!(matches!(&refused, DrawError::BeyondGpu(reason) if reason.contains("dispatches")), "{refused}");
     }
 }

@@ -98,7 +98,7 @@ impl Banding {
         let room = seen.saturating_sub(2 * u64::from(margin));
         if room == 0 {
             let why = "the device has no room for what lines so wide key at in a picture so wide";
-            return Err(DrawError::Device(why.to_owned()));
+            return Err(DrawError::BeyondGpu(why.to_owned()));
         }
         Ok(Self { rows: rows.min(room) as u32, margin, beyond })
     }
