@@ -23,7 +23,7 @@ pub fn explain(output: &Output, gpu: &GpuStatus, read: Duration, times: &[(Stage
     }
     if output.draw_times.mixed_pixels > 0 {
         let why = "faces that differ in colour meet near them";
-        say!("mixed pixels, drawn from 256 points each because {why}: {}", output.draw_times.mixed_pixels);
+        say!("mixed pixels, drawn from 64 or 256 points each because {why}: {}", output.draw_times.mixed_pixels);
     }
     if output.short_chains > 0 {
         say!("lines left out, shorter than wire.min_length or outline.min_length: {}", output.short_chains);

@@ -8,24 +8,24 @@ use crate::warning::Warning;
 /// Samples per pixel of pictures that ask for adaptive ones and cannot have them.
 const INSTEAD: u32 = 16;
 
-/// What a plan draws besides faces.
+/// What a plan draws.
 #[derive(Clone, Copy, Debug)]
-pub struct Others {
-    /// True if lines of exact width are drawn.
-    pub lines: bool,
+pub struct Shown {
+    /// True if faces are filled, or an outline's triangles are.
+    pub faces: bool,
     /// True if something is transparent.
     pub layers: bool,
 }
 
 /// Samples in every pixel, and true if mixed pixels are drawn from coverage points besides.
-pub fn samples(scene: &Scene<'_, '_>, others: Others, cx: &mut PlanContext<'_>) -> (u32, bool) {
+pub fn samples(scene: &Scene<'_, '_>, shown: Shown, cx: &mut PlanContext<'_>) -> (u32, bool) {
     let samples = scene.spec.image.samples;
     if let Samples::Fixed(samples) = samples {
         return (samples, false);
     }
-    let reason = if others.lines {
-        "lines are drawn over faces"
-    } else if others.layers {
+    let reason = if !shown.faces {
+        "no face is filled"
+    } else if shown.layers {
         "something is transparent"
     } else if scene.spec.backend == BackendChoice::Gpu {
         "the GPU draws fixed samples alone"

@@ -205,8 +205,8 @@ fn image() -> Vec<Field> {
         "image.format" |d| d.image.format, short "format", default Null;
             "null: the file extension, then the Accept header, then PNG.";
         "image.samples" |d| d.samples, short "samples", default 4;
-            "Visibility samples per pixel. adaptive: 4, and 256 points in each pixel near which faces meet that differ in colour. \
-             Pictures with lines over faces, or with something transparent, have 16 samples per pixel instead, and a warning.";
+            "Visibility samples per pixel. adaptive: 4, and 64 or 256 points in each pixel near which faces meet that differ in \
+             colour. Pictures without filled faces, or with something transparent, have 16 samples per pixel instead, and a warning.";
         "image.max_error" |d| d.max_error, in Kind::Above0 { max: 255.0 }, short "max_error", default Null;
             "Largest expected error, RMSE in /255: the cheapest samples, wire.method and backend that reach it are chosen, \
              except those that are given.";

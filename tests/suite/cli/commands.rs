@@ -262,13 +262,14 @@ fn explain_counts_mixed_pixels() {
         String::from_utf8(output.stderr).unwrap()
     };
     let flat = explained(&["flat"]);
-    let line = flat.lines().find(|line| line.starts_with("mixed pixels, drawn from 256 points each")).unwrap();
+    let line = flat.lines().find(|line| line.starts_with("mixed pixels, drawn from 64 or 256 points each")).unwrap();
     let count: u32 = line.rsplit(' ').next().unwrap().parse().unwrap();
     assert!((100..2000).contains(&count), "{line}");
     assert!(flat.contains("drawn by cpu") && flat.contains("mixed "), "{flat}");
-    let wire = explained(&["wire"]);
-    assert!(!wire.contains("mixed pixels"), "{wire}");
-    assert!(wire.contains("warning: image.samples is adaptive, and lines are drawn over faces"), "{wire}");
+    assert!(explained(&["wire"]).contains("mixed pixels"));
+    let frame = explained(&["wireframe"]);
+    assert!(!frame.contains("mixed pixels"), "{frame}");
+    assert!(frame.contains("warning: image.samples is adaptive, and no face is filled"), "{frame}");
 }
 
 /// Drivers look for a display where nothing tells them not to, and complain on standard error.

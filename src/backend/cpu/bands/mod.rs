@@ -150,7 +150,7 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
     if plan.hides_lines() {
         scratch.farthest.clear(&scratch.samples);
     }
-    let compositor = LineCompositor::new(plan, &scratch.samples, scratch.peel.as_ref());
+    let compositor = LineCompositor::new(plan, &scratch.samples, scratch.peel.as_ref(), &scratch.mixed.border);
     for (pass, edges) in plan.lines.iter().zip(&bins.edges) {
         let has_faces = || plan.has_holes_under(pass) && bins.triangles.iter().any(|chunk| !chunk.is_empty_in(band));
         if edges.iter().all(|chunk| chunk.is_empty_in(band)) && !has_faces() {

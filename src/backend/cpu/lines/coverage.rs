@@ -140,6 +140,52 @@ fn to_f32(v: u64) -> f32 {
     (v >> 32) as f32 * 4_294_967_296.0 + (v as u32) as f32
 }
 
+/// The points that see something in mixed pixels of which others see nothing.
+#[derive(Default)]
+pub struct BorderPoints {
+    /// Per pixel, 1 more than its index in `masks`; 0 for all others. Empty where no line asks.
+    places: Vec<u32>,
+    masks: Vec<Mask>,
+}
+
+impl BorderPoints {
+    /// Bytes of a pixel, if it has points.
+    pub const PIXEL_BYTES: usize = size_of::<u32>() + size_of::<Mask>();
+
+    /// Allocated bytes.
+    pub fn bytes(&self) -> usize {
+        self.places.capacity() * size_of::<u32>() + self.masks.capacity() * size_of::<Mask>()
+    }
+
+    /// Forgets all points, and takes on a number of pixels.
+    pub fn reset(&mut self, pixels: usize) {
+        self.places.clear();
+        self.places.reserve_exact(pixels);
+        self.places.resize(pixels, 0);
+        self.masks.clear();
+        // What is not touched takes no memory.
+        self.masks.reserve_exact(pixels);
+    }
+
+    /// Sets a pixel's points, given in sets of 64.
+    pub fn set(&mut self, pixel: usize, points: [u64; POINTS as usize / 64]) {
+        let mut mask = NO_POINTS;
+        for point in (0..POINTS as usize).filter(|point| points[point / 64] >> (point % 64) & 1 != 0) {
+            mask[point % WORDS] |= 0x8000 >> (point / WORDS);
+        }
+        if let Some(place) = self.places.get_mut(pixel) {
+            self.masks.push(mask);
+            *place = self.masks.len() as u32;
+        }
+    }
+
+    /// A pixel's points, where some see nothing.
+    #[inline(always)]
+    fn of(&self, pixel: usize) -> Option<&Mask> {
+        self.masks.get((*self.places.get(pixel)? as usize).wrapping_sub(1))
+    }
+}
+
 /// Composites the strokes of line passes over a band's colours.
 pub struct LineCompositor<'a> {
     plan: &'a DrawPlan<'a>,
@@ -148,6 +194,8 @@ pub struct LineCompositor<'a> {
     peel: Option<&'a PeelBand>,
     /// The points assigned to each sample; empty where there is no surface under the lines.
     sample_masks: Vec<Mask>,
+    /// The points that see the surface in mixed pixels at its border.
+    border: &'a BorderPoints,
 }
 
 /// Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent
@@ -155,12 +203,18 @@ pub struct LineCompositor<'a> {
 pub const ALPHA_MIN: f32 = 1e-4;
 
 impl<'a> LineCompositor<'a> {
-    /// A compositor for a band and, where the plan has them, its peeled layers.
-    pub fn new(plan: &'a DrawPlan<'a>, band: &'a SampleBand, peel: Option<&'a PeelBand>) -> Self {
+    /// A compositor for a band and, where the plan has them, its peeled layers and mixed pixels.
+    pub fn new(
+        plan: &'a DrawPlan<'a>,
+        band: &'a SampleBand,
+        peel: Option<&'a PeelBand>,
+        border: &'a BorderPoints,
+    ) -> Self {
         let samples = if plan.is_shaded() && !plan.lines.is_empty() { plan.samples } else { 0 };
         // The scratch may still hold the layers of another plan.
         let peel = peel.filter(|_| plan.peeling().is_some());
-        Self { plan, band, peel, sample_masks: (0..samples).map(|s| points_of_sample(samples, s)).collect() }
+        let sample_masks = (0..samples).map(|s| points_of_sample(samples, s)).collect();
+        Self { plan, band, peel, sample_masks, border }
     }
 
     /// The background behind a pixel.
@@ -185,7 +239,10 @@ impl<'a> LineCompositor<'a> {
             let over = self.peel.map_or(0.0, |peel| peel.alpha(x, y, s as u32));
             if self.band.pixel(x as i32, y as i32).0[s] == NOTHING { over } else { 1.0 }
         };
-        let weight = weight(&self.sample_masks, shown, mask, opacity);
+        let weight = match self.border.of(pixel) {
+            Some(seen) => weight_of_points(seen, mask, opacity),
+            None => weight(&self.sample_masks, shown, mask, opacity),
+        };
         [surface[0] * weight, surface[1] * weight, surface[2] * weight, (surface[3] * weight).min(1.0)]
     }
 }
@@ -258,7 +315,20 @@ fn weight(sample_masks: &[Mask], alpha: impl Fn(usize) -> f32, mask: &Mask, opac
             surface_covered += alpha * count(&std::array::from_fn(|l| mask[l] & cell[l])) as f32;
         }
     }
-    if surface < ALPHA_MIN || surface == POINTS as f32 {
+    ratio(surface, surface_covered, covered, opacity)
+}
+
+/// The same, given the points that see the surface.
+#[inline(always)]
+fn weight_of_points(seen: &Mask, mask: &Mask, opacity: f32) -> f32 {
+    let both = std::array::from_fn(|l| mask[l] & seen[l]);
+    ratio(count(seen) as f32, count(&both) as f32, count(mask), opacity)
+}
+
+/// The same, given how many points the surface has, how many of these the line covers, and how many it covers in all.
+#[inline(always)]
+fn ratio(surface: f32, surface_covered: f32, covered: u32, opacity: f32) -> f32 {
+    if covered == 0 || covered == POINTS || surface < ALPHA_MIN || surface == POINTS as f32 {
         return 1.0;
     }
     let shown = surface - opacity * surface_covered;
@@ -296,7 +366,7 @@ mod tests {
     fn a_line_is_laid_over_the_surface_as_it_is_over_each_point() {
         let mut state = 0x9E37_79B9_7F4A_7C15;
         let mut cases = 0;
-        let (mut weighed, mut farthest) = (0, 0.0_f64);
+        let (mut weighed, mut compared, mut farthest) = (0, 0, 0.0_f64);
         for samples in [1, 4, 8, 16] {
             let masks: Vec<Mask> = (0..samples).map(|s| points_of_sample(samples, s)).collect();
             for case in 0..2000 {
@@ -315,6 +385,12 @@ mod tests {
                 let opaque = [0.2_f32, 0.5, 0.7, 1.0];
                 let background = [0.25_f32, 0.05, 0.5, 0.5];
                 let weight = weight(&masks, |s| alphas[s], &mask, opacity);
+                if case / 3 % 2 == 0 {
+                    let seen =
+                        |k: usize| (0..masks.len()).filter(|&s| alphas[s] > 0.0).fold(0, |all, s| all | masks[s][k]);
+                    assert_eq!(weight_of_points(&std::array::from_fn(seen), &mask, opacity), weight);
+                    compared += 1;
+                }
                 weighed += usize::from(weight != 1.0);
                 let below = over_background(opaque.map(|v| v * share * weight), background);
                 let cover = count(&mask) as f32 / POINTS as f32;
@@ -329,7 +405,7 @@ mod tests {
             }
         }
         assert_eq!(cases, 8000);
-        assert!(weighed > 4000 && farthest > 0.0, "{weighed}");
+        assert!(weighed > 4000 && compared > 3000 && farthest > 0.0, "{weighed} {compared}");
     }
 
     #[test]

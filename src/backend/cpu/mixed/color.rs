@@ -1,41 +1,168 @@
 //! Stage mixed, per pixel: its colour by what its points see. Each triangle is shaded once, at the mean of its points, and
 //! weighs its share of them.
 
-use super::pixels::{Seen, SomePixels};
+use std::ops::ControlFlow;
+
+use super::band_triangles::{BandTriangles, ScreenTriangle};
+use super::crowd::Crowd;
+use super::faces::PixelFaces;
+use super::find::MixedPixels;
+use super::lists::{ListsEnd, PIXELS_MAX, PixelLists};
+use super::points::{ALL_WORDS, Lattice, PointSet};
+use super::recent::Recent;
 use super::shares::{Share, Shares};
+use super::triangle::PointTriangle;
 use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::deadline_poll::DeadlinePoll;
+use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::recip;
 use crate::backend::cpu::isa::dispatch;
 use crate::backend::cpu::surface::shade::Shader;
 use crate::backend::cpu::surface::waiting::{Point, Waiting};
-use crate::backend::sample_partition::POINTS;
+
+/// What mixed pixels are found to be.
+#[derive(Default)]
+pub struct Found {
+    /// By pixel: premultiplied linear RGBA, nothing behind it.
+    pub colors: Vec<[f32; 4]>,
+    /// The pixels, by number, of which some points see nothing, and the points that see something.
+    pub borders: Vec<(u32, PointSet<ALL_WORDS>)>,
+}
+
+impl Found {
+    /// Allocated memory, at most, bytes.
+    pub const BYTES_MAX: usize = PIXELS_MAX * (size_of::<[f32; 4]>() + size_of::<(u32, PointSet<ALL_WORDS>)>());
+
+    /// Allocated memory, bytes.
+    pub fn bytes(&self) -> usize {
+        self.colors.capacity() * size_of::<[f32; 4]>()
+            + self.borders.capacity() * size_of::<(u32, PointSet<ALL_WORDS>)>()
+    }
+}
 
 dispatch! {
-    /// Finds the colours of some mixed pixels.
-    pub fn color(context: &RasterContext<'_>, some: &mut SomePixels<'_>) = color_kernel
+    /// Finds the colours of the mixed pixels that have lists, or of the one whose list has no room.
+    pub fn color(
+        context: &RasterContext<'_>,
+        triangles: (&BandTriangles<'_>, &PixelLists, &mut Recent),
+        pixels: &MixedPixels,
+        samples: &SampleBand,
+        found: &mut Found,
+    ) = color_kernel
 }
 
 #[inline(always)]
-fn color_kernel(context: &RasterContext<'_>, some: &mut SomePixels<'_>) {
+fn color_kernel(
+    context: &RasterContext<'_>,
+    (triangles, lists, recent): (&BandTriangles<'_>, &PixelLists, &mut Recent),
+    pixels: &MixedPixels,
+    samples: &SampleBand,
+    found: &mut Found,
+) {
     let plan = context.plan;
     let surface =
         plan.surface.as_ref().filter(|surface| surface.is_shaded && !context.is_plain && context.flat.is_none());
     let waiting = surface.map(|surface| Waiting::new(context, surface));
     let mut painter = Painter { context, shader: Shader::new(context), waiting };
-    let mut shares = Shares::new();
-    let mut row = some.first_row();
-    for i in 0..some.len() {
-        let pixel = some.place(i, &mut row);
-        let Seen { faces, crowd_of, crowds, .. } = some.seen();
-        match crowds.get(usize::from(crowd_of[i]).wrapping_sub(1)) {
-            Some(crowd) => crowd.shares(&mut shares),
-            None => faces[i].shares(&mut shares),
+    let mut few = Points::<1>::new();
+    let mut all = Points::<ALL_WORDS>::new();
+    let Found { colors, borders } = found;
+    borders.clear();
+    borders.reserve_exact(PIXELS_MAX);
+    colors.clear();
+    colors.reserve_exact(PIXELS_MAX);
+    colors.resize(lists.pixels.len(), [0.0; 4]);
+    let mut row = pixels.row_of(lists.pixels.start, samples);
+    let mut poll = DeadlinePoll::new(context.deadline);
+    for (i, pixel) in lists.pixels.clone().enumerate() {
+        let place = pixels.place(pixel, samples, &mut row);
+        let items = (lists.end == ListsEnd::Whole).then(|| lists.of(i));
+        let own_z = samples.depth[samples.index(place[0] as i32, place[1] as i32, 0)];
+        let of_pixel = (i, place, own_z);
+        if pixels.needs_few[pixel] {
+            few.see(context, (triangles, recent), items, place);
+            painter.paint(&few.shares, of_pixel, colors);
+        } else {
+            all.see(context, (triangles, recent), items, place);
+            painter.paint(&all.shares, of_pixel, colors);
+            let seen = all.shares.points();
+            if seen != PointSet::ALL && seen != PointSet::NONE {
+                borders.push((i as u32, seen));
+            }
         }
-        let own_z = some.samples.depth[some.samples.index(pixel[0] as i32, pixel[1] as i32, 0)];
-        painter.paint(&shares, (i, pixel, own_z), some.colors_mut());
+        if poll.is_expired_after(items.map_or(1, <[u32]>::len) as u64, 0) {
+            return;
+        }
     }
     if let Some(waiting) = &mut painter.waiting {
-        waiting.shade(some.colors_mut());
+        waiting.shade(colors);
+    }
+}
+
+/// What the points of a pixel see, of those of which sets have `W` words.
+struct Points<const W: usize> {
+    faces: PixelFaces<W>,
+    shares: Shares<W>,
+}
+
+impl<const W: usize> Points<W> {
+    fn new() -> Self {
+        Self { faces: PixelFaces::EMPTY, shares: Shares::new() }
+    }
+
+    /// Finds the shares of the triangles of a pixel; of all of the band where it has no list of them.
+    #[inline(always)]
+    fn see(
+        &mut self,
+        context: &RasterContext<'_>,
+        (triangles, recent): (&BandTriangles<'_>, &mut Recent),
+        items: Option<&[u32]>,
+        [x, y]: [u32; 2],
+    ) {
+        let [width, height] = [context.plan.width_px, context.plan.height_px].map(|size| size as i32);
+        let corner = [256 * x as i32 - 128 * width, 256 * y as i32 - 128 * height];
+        if let (Some(items), false) = (items, context.is_plain) {
+            self.faces.clear();
+            let mut has_place = true;
+            for &item in items {
+                if let Some(triangle) = recent.get(triangles, item)
+                    && !self.faces.offer(context.isa, triangle, corner)
+                {
+                    has_place = false;
+                    break;
+                }
+            }
+            if has_place {
+                return self.faces.shares(&mut self.shares);
+            }
+        }
+        self.see_many(context, triangles, items, corner);
+    }
+
+    /// The same, for pixels of many faces.
+    #[inline(never)]
+    fn see_many(
+        &mut self,
+        context: &RasterContext<'_>,
+        triangles: &BandTriangles<'_>,
+        items: Option<&[u32]>,
+        corner: [i32; 2],
+    ) {
+        let mut crowd = Crowd::EMPTY;
+        let mut poll = DeadlinePoll::new(context.deadline);
+        let mut offer = |ScreenTriangle { id, corners, .. }: ScreenTriangle| {
+            if let Some(mut triangle) = PointTriangle::new(id, &corners) {
+                crowd.offer(context.isa, &mut triangle, corner);
+            }
+            let is_expired = poll.is_expired(Lattice::<W>::POINTS as u64);
+            if is_expired { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        // A picture whose deadline has passed is thrown away.
+        let _ = match items {
+            Some(items) => items.iter().try_for_each(|&item| offer(triangles.get(item))),
+            None => triangles.for_each(offer),
+        };
+        crowd.shares(&mut self.shares);
     }
 }
 
@@ -49,7 +176,12 @@ struct Painter<'a> {
 impl Painter<'_> {
     /// Adds to the colour of pixel number `i`, whose first sample has the depth `own_z`, what it shows.
     #[inline(always)]
-    fn paint(&mut self, shares: &Shares, (i, pixel, own_z): (usize, [u32; 2], f32), colors: &mut [[f32; 4]]) {
+    fn paint<const W: usize>(
+        &mut self,
+        shares: &Shares<W>,
+        (i, pixel, own_z): (usize, [u32; 2], f32),
+        colors: &mut [[f32; 4]],
+    ) {
         let plan = self.context.plan;
         let size = [plan.width_px, plan.height_px];
         let mut is_of_surface = true;
@@ -58,7 +190,7 @@ impl Painter<'_> {
         }
         for Share { id, points, depth } in shares.all() {
             let count = points.count();
-            let weight = count as f32 / POINTS as f32;
+            let weight = count as f32 / Lattice::<W>::POINTS as f32;
             if let Some(color) = self.context.flat.and_then(|flat| flat.known(*id)) {
                 add(&mut colors[i], weight, color);
                 continue;

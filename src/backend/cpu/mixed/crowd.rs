@@ -1,56 +1,47 @@
 //! Stage mixed, per pixel: the face that each point sees, one after the other. For pixels of many faces, and for tests.
 
-use super::faces::PixelFaces;
-use super::points::PointSet;
+use super::points::{Lattice, PointSet};
 use super::shares::{Share, Shares};
 use super::triangle::PointTriangle;
 use crate::backend::cpu::geometry::samples::NOTHING;
 use crate::backend::cpu::isa::{Isa, LANES};
 use crate::backend::sample_partition::POINTS;
 
-/// The faces that the points of a pixel see, and their depths.
-pub struct Crowd {
+/// The faces that the points of a pixel see, and their depths; by word and bit of a set.
+pub struct Crowd<const W: usize> {
     /// Reversed depth of each point; 0 where there is nothing.
-    pub depth: [f32; POINTS],
+    depth: [[f32; 64]; W],
     /// Triangle of each.
-    pub ids: [u32; POINTS],
+    ids: [[u32; 64]; W],
     /// No point is farther.
     farthest: f32,
 }
 
-impl Crowd {
+impl<const W: usize> Crowd<W> {
     /// A pixel without triangles.
-    pub const EMPTY: Self = Self { depth: [0.0; POINTS], ids: [NOTHING; POINTS], farthest: 0.0 };
-
-    /// A pixel of these faces.
-    pub fn of(pixel: &PixelFaces) -> Self {
-        let mut crowd = Self::EMPTY;
-        for face in pixel.faces() {
-            face.points.for_each(|i| (crowd.depth[i], crowd.ids[i]) = (face.plane.at(i), face.id));
-        }
-        crowd
-    }
+    pub const EMPTY: Self = Self { depth: [[0.0; 64]; W], ids: [[NOTHING; 64]; W], farthest: 0.0 };
 
     /// Offers a triangle to the points of the pixel with this upper left corner, 1/256 px from the
     /// picture's centre.
     #[inline(always)]
-    pub fn offer(&mut self, isa: Isa, triangle: &mut PointTriangle, id: u32, corner: [i32; 2]) {
+    pub fn offer(&mut self, isa: Isa, triangle: &mut PointTriangle, corner: [i32; 2]) {
         // Of equal depths the lower id is kept.
         if triangle.nearest < self.farthest {
             return;
         }
         let Some(outline) = triangle.at(corner) else { return };
-        let plane = triangle.plane_at(corner);
-        let seen = outline.inside(isa).filter(|i| {
-            let (own, other) = (plane.at(i), self.depth[i]);
-            own > other || (own == other && own > 0.0 && id < self.ids[i])
+        let (id, plane) = (triangle.id, triangle.plane_at(corner));
+        let (depth, ids) = (self.depth.as_flattened_mut(), self.ids.as_flattened_mut());
+        let seen = outline.inside::<W>(isa).filter(|i| {
+            let (own, other) = (plane.at::<W>(i), depth[i]);
+            own > other || (own == other && own > 0.0 && id < ids[i])
         });
         if seen.is_empty() {
             return;
         }
-        seen.for_each(|i| (self.depth[i], self.ids[i]) = (plane.at(i), id));
+        seen.for_each(|i| (depth[i], ids[i]) = (plane.at::<W>(i), id));
         let mut farthest = [f32::INFINITY; LANES];
-        for depths in self.depth.as_chunks::<LANES>().0 {
+        for depths in depth.as_chunks::<LANES>().0 {
             for l in 0..LANES {
                 farthest[l] = if depths[l] < farthest[l] { depths[l] } else { farthest[l] };
             }
@@ -58,21 +49,20 @@ impl Crowd {
         self.farthest = farthest.into_iter().fold(f32::INFINITY, |least, z| if z < least { z } else { least });
     }
 
-    /// As [`PixelFaces::shares`].
-    pub fn shares(&self, shares: &mut Shares) {
+    /// As [`PixelFaces::shares`](super::faces::PixelFaces::shares).
+    pub fn shares(&self, shares: &mut Shares<W>) {
         shares.clear();
         // By hash: one more than the number of the share; 0 where there is none.
         let mut places = [0_u16; 2 * POINTS];
-        for (i, &id) in self.ids.iter().enumerate() {
-            if id == NOTHING {
-                continue;
-            }
+        let (depth, ids) = (self.depth.as_flattened(), self.ids.as_flattened());
+        for i in (0..Lattice::<W>::POINTS).filter(|&i| ids[i] != NOTHING) {
+            let id = ids[i];
             let mut place = id as usize % places.len();
             while places[place] != 0 && shares.all()[usize::from(places[place]) - 1].id != id {
                 place = (place + 1) % places.len();
             }
             if places[place] == 0 {
-                shares.push(Share { id, points: PointSet::NONE, depth: self.depth[i] });
+                shares.push(Share { id, points: PointSet::NONE, depth: depth[i] });
                 places[place] = shares.all().len() as u16;
             }
             shares.add_point(usize::from(places[place]) - 1, i);

@@ -1,33 +1,39 @@
 //! Stage mixed, per band: draws the mixed pixels of a band once more.
 
-use super::color::color;
+use super::band_triangles::BandTriangles;
+use super::color::{Found, color};
 use super::find::{MixedPixels, find};
-use super::pixels::{AT_ONCE, Seen, SomePixels};
+use super::lists::{ListsEnd, PIXELS_MAX, PixelLists, fill};
+use super::recent::Recent;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
-use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::SampleBand;
-use crate::backend::cpu::isa::dispatch;
-use crate::backend::sample_partition::POINTS;
+use crate::backend::cpu::lines::coverage::BorderPoints;
 
 /// Buffers of the stage.
 #[derive(Default)]
 pub struct MixedScratch {
     /// The band's mixed pixels.
     pub pixels: MixedPixels,
-    /// The faces that the points of some of them see.
-    seen: Seen,
+    /// The triangles that some of them may show.
+    lists: PixelLists,
+    recent: Recent,
+    /// What they are.
+    found: Found,
+    /// The points that see something in pixels at the border of all faces, for lines over them.
+    pub border: BorderPoints,
 }
 
 impl MixedScratch {
     /// Allocated memory, bytes.
     pub fn bytes(&self) -> usize {
-        self.pixels.bytes() + self.seen.bytes()
+        self.pixels.bytes() + self.lists.bytes() + self.recent.bytes() + self.found.bytes() + self.border.bytes()
     }
 
     /// The [`bytes`](Self::bytes) of a band of so many columns and rows, at most.
     pub const fn bytes_of(size: [usize; 2]) -> usize {
-        MixedPixels::bytes_of(size) + Seen::BYTES_MAX
+        let border = size[0] * size[1] * BorderPoints::PIXEL_BYTES;
+        MixedPixels::bytes_of(size) + PixelLists::BYTES_MAX + Recent::BYTES_MAX + Found::BYTES_MAX + border
     }
 }
 
@@ -35,59 +41,47 @@ impl MixedScratch {
 /// (premultiplied linear RGBA, nothing behind it).
 pub fn draw_mixed(
     context: &RasterContext<'_>,
-    (bins, band): (&[TriangleBin], usize),
+    bins: (&[TriangleBin], usize),
     samples: &SampleBand,
     scratch: &mut MixedScratch,
     mut each: impl FnMut(u32, u32, [f32; 4]),
 ) {
-    let MixedScratch { pixels, seen } = scratch;
+    let MixedScratch { pixels, lists, recent, found, border } = scratch;
     find(context.isa, context, samples, pixels);
-    context.watch.count_mixed(pixels.columns.len());
-    for first in (0..pixels.columns.len()).step_by(AT_ONCE) {
-        if context.deadline.check().is_err() {
-            return;
+    let all = pixels.columns.len();
+    context.watch.count_mixed(all);
+    let triangles = BandTriangles::new(context, bins);
+    recent.clear();
+    let width = samples.size_px[0] as usize;
+    border.reset(if context.plan.lines.is_empty() {
+        0
+    } else {
+        width * (samples.shown[1] - samples.shown[0]) as usize
+    });
+    let (mut first, mut at_once) = (0, PIXELS_MAX);
+    while first < all && context.deadline.check().is_ok() {
+        let end = all.min(first + at_once);
+        lists.pixels = first..end;
+        fill(context.isa, context, &triangles, pixels, samples, lists);
+        match lists.end {
+            ListsEnd::Expired => return,
+            // One pixel goes without a list where it is too long.
+            ListsEnd::Full if end - first > 1 => {
+                at_once = (end - first).div_ceil(4);
+                continue;
+            }
+            ListsEnd::Full | ListsEnd::Whole => {}
         }
-        let count = AT_ONCE.min(pixels.columns.len() - first);
-        let some = &mut SomePixels::new((pixels, first, count), seen, samples);
-        see(context.isa, context, (bins, band), some);
-        color(context.isa, context, some);
-        let mut row = some.first_row();
-        for i in 0..count {
-            let [x, y] = some.place(i, &mut row);
-            each(x, y, some.seen().colors[i]);
-        }
-    }
-}
-
-dispatch! {
-    /// Finds what the points of some mixed pixels see.
-    pub fn see(context: &RasterContext<'_>, bins: (&[TriangleBin], usize), some: &mut SomePixels<'_>) = see_kernel
-}
-
-#[inline(always)]
-fn see_kernel(context: &RasterContext<'_>, (bins, band): (&[TriangleBin], usize), some: &mut SomePixels<'_>) {
-    let rows = some.rows();
-    let mut poll = DeadlinePoll::new(context.deadline);
-    for bin in bins {
-        for (id, piece) in bin.pieces_in(band) {
-            let pixels = some.offer(context, id, piece, rows);
-            if poll.is_expired(pixels * POINTS as u64) {
-                return;
+        color(context.isa, context, (&triangles, lists, recent), pixels, samples, found);
+        let mut row = pixels.row_of(first, samples);
+        let mut borders = found.borders.iter().peekable();
+        for (i, color) in found.colors.iter().enumerate() {
+            let [x, y] = pixels.place(first + i, samples, &mut row);
+            each(x, y, *color);
+            if let Some((_, points)) = borders.next_if(|(at, _)| *at == i as u32) {
+                border.set((y - samples.shown[0]) as usize * width + x as usize, points.0);
             }
         }
-    }
-    // What faces away is mostly hidden by then.
-    for is_front in [true, false] {
-        for bin in bins {
-            let (listed, others) = if is_front { &bin.fronts } else { &bin.backs }.items_in(band);
-            for ids in [listed, &others] {
-                for &id in ids {
-                    let pixels = some.offer(context, id, &context.screen_triangle(id), rows);
-                    if poll.is_expired(pixels * POINTS as u64) {
-                        return;
-                    }
-                }
-            }
-        }
+        first = end;
     }
 }

@@ -12,35 +12,35 @@ use crate::backend::cpu::isa::Isa;
 const FACES_MAX: usize = 16;
 
 /// The faces that the points of a pixel see.
-pub struct PixelFaces {
+pub struct PixelFaces<const W: usize> {
     /// The points that see one.
-    covered: PointSet,
+    covered: PointSet<W>,
     /// No point is farther; 0 where one sees nothing.
     farthest: f32,
     /// Number of faces.
     count: usize,
-    faces: [Face; FACES_MAX],
+    faces: [Face<W>; FACES_MAX],
 }
 
 /// A face, or a piece of one, and the points that see it.
 #[derive(Clone, Copy, Debug)]
-pub struct Face {
+pub struct Face<const W: usize> {
     /// The triangle.
     pub id: u32,
     /// The points that see it: at least one.
-    pub points: PointSet,
+    pub points: PointSet<W>,
     /// Its depth in the pixel.
     pub plane: Plane,
     /// Between these all its depths are.
     extremes: [f32; 2],
 }
 
-impl Face {
+impl<const W: usize> Face<W> {
     const EMPTY: Self = Self { id: 0, points: PointSet::NONE, plane: Plane::EMPTY, extremes: [0.0; 2] };
 
     /// Those of the points at which this face hides another one: of equal depths, the lower id is in front.
     #[inline(always)]
-    fn hides(&self, other: &Self, points: PointSet) -> PointSet {
+    fn hides(&self, other: &Self, points: PointSet<W>) -> PointSet<W> {
         if self.extremes[0] > other.extremes[1] {
             return points;
         }
@@ -48,13 +48,13 @@ impl Face {
             return PointSet::NONE;
         }
         points.filter(|i| {
-            let (own, of_other) = (self.plane.at(i), other.plane.at(i));
+            let (own, of_other) = (self.plane.at::<W>(i), other.plane.at::<W>(i));
             own > of_other || (own == of_other && self.id < other.id)
         })
     }
 }
 
-impl PixelFaces {
+impl<const W: usize> PixelFaces<W> {
     /// A pixel without faces.
     pub const EMPTY: Self = Self { covered: PointSet::NONE, farthest: 0.0, count: 0, faces: [Face::EMPTY; FACES_MAX] };
 
@@ -66,24 +66,23 @@ impl PixelFaces {
 
     /// Its faces, in no order.
     #[inline(always)]
-    pub fn faces(&self) -> &[Face] {
+    fn faces(&self) -> &[Face<W>] {
         &self.faces[..self.count]
     }
 
     /// Finds the triangles' shares.
     #[inline(always)]
-    pub fn shares(&self, shares: &mut Shares) {
+    pub fn shares(&self, shares: &mut Shares<W>) {
         shares.clear();
         for face in self.faces() {
-            shares.insert(Share { id: face.id, points: face.points, depth: face.plane.at(face.points.first()) });
+            shares.insert(Share { id: face.id, points: face.points, depth: face.plane.at::<W>(face.points.first()) });
         }
     }
 
     /// Offers a triangle to the points of the pixel with this upper left corner, 1/256 px from the picture's centre.
-    /// False if there is no place for it. Then others may have lost points to it already, which are to be offered to it
-    /// again.
+    /// False if there is no place for it. Then others may have lost points to it, and all are to be offered again.
     #[inline(always)]
-    pub fn offer(&mut self, isa: Isa, triangle: &mut PointTriangle, id: u32, corner: [i32; 2]) -> bool {
+    pub fn offer(&mut self, isa: Isa, triangle: &mut PointTriangle, corner: [i32; 2]) -> bool {
         if triangle.nearest < self.farthest {
             return true;
         }
@@ -96,9 +95,9 @@ impl PixelFaces {
         let mut points = outline.inside(isa);
         // What is as far as nothing is not seen.
         if extremes[0] <= 0.0 {
-            points = points.filter(|i| plane.at(i) > 0.0);
+            points = points.filter(|i| plane.at::<W>(i) > 0.0);
         }
-        let mut face = Face { id, points, plane, extremes };
+        let mut face = Face { id: triangle.id, points, plane, extremes };
         if !points.and(self.covered).is_empty() {
             self.part(&mut face);
         }
@@ -122,7 +121,7 @@ impl PixelFaces {
 
     /// Parts the points that a face and others cover by who is in front. Faces that are hidden lose their places.
     #[inline(always)]
-    fn part(&mut self, face: &mut Face) {
+    fn part(&mut self, face: &mut Face<W>) {
         let mut kept = 0;
         for i in 0..self.count {
             let mut other = self.faces[i];

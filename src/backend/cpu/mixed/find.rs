@@ -1,10 +1,12 @@
-//! Stage mixed, per pixel: finds the mixed pixels.
+//! Stage mixed, per pixel: finds the mixed pixels, and knows where they are.
 //!
 //! A pixel is mixed if its samples and those of its four neighbours show several faces (or a face and
-//! nothing) and colours do not go on from one to the next ([`Pairs::goes_on`]). Where an edge goes through a pixel
+//! nothing) and colours break off from one to the next ([`Pairs::step`]). Where an edge goes through a pixel
 //! without parting its samples, it parts those of neighbours.
 
-use super::look::Pairs;
+use std::ops::Range;
+
+use super::look::{Pairs, Step};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::isa::dispatch;
@@ -14,15 +16,19 @@ use crate::backend::cpu::isa::dispatch;
 pub struct MixedPixels {
     /// The column of each.
     pub columns: Vec<u16>,
+    /// True for each that few points are enough for.
+    pub needs_few: Vec<bool>,
     /// By pixel of the shown rows, and after the last: the number of mixed pixels before it.
     pub starts: Vec<u32>,
+    /// The number of mixed pixels above and left of each corner of a pixel, row by row.
+    pub sums: Vec<u32>,
     /// By row modulo 3: the places where colours do not go on, as bits of [`breaks`].
     breaks: [Row; 3],
     /// Of one row.
     is_mixed: Vec<u8>,
 }
 
-/// Places where colours do not go on from sample to sample.
+/// Places where colours break off from sample to sample, slightly or more.
 mod breaks {
     /// From the pixel's first sample to its others, one after the other.
     pub const OWN: u8 = 1;
@@ -30,6 +36,8 @@ mod breaks {
     pub const LEFT: u8 = 2;
     /// The same from the pixel above.
     pub const UPPER: u8 = 4;
+    /// From the bits above to those of the same places where colours break off more than slightly.
+    pub const HARD: u32 = 4;
 }
 
 /// Values of a row's pixels, and of one more on each side.
@@ -58,9 +66,14 @@ impl MixedPixels {
     /// Empties the lists, which have room for a band of so many columns and rows from then on.
     pub fn reset(&mut self, [width, rows]: [usize; 2]) {
         self.columns.clear();
+        self.needs_few.clear();
         self.starts.clear();
         self.columns.reserve_exact(width * rows);
+        self.needs_few.reserve_exact(width * rows);
         self.starts.reserve_exact(width * rows + 1);
+        self.sums.clear();
+        self.sums.reserve_exact((width + 1) * (rows + 1));
+        self.sums.resize(width + 1, 0);
         for row in &mut self.breaks {
             row.reset(width);
         }
@@ -71,15 +84,17 @@ impl MixedPixels {
     /// Allocated memory, bytes.
     pub fn bytes(&self) -> usize {
         self.columns.capacity() * size_of::<u16>()
-            + self.starts.capacity() * size_of::<u32>()
+            + self.needs_few.capacity()
+            + (self.starts.capacity() + self.sums.capacity()) * size_of::<u32>()
             + self.breaks.iter().map(Row::bytes).sum::<usize>()
             + self.is_mixed.capacity()
     }
 
     /// The [`bytes`](Self::bytes) of a band, at most.
     pub const fn bytes_of([width, rows]: [usize; 2]) -> usize {
-        let pixel = size_of::<u16>() + size_of::<u32>();
-        width * rows * pixel + size_of::<u32>() + 3 * (width + 2) + width
+        let pixel = size_of::<u16>() + size_of::<bool>() + size_of::<u32>();
+        let corners = (width + 1) * (rows + 1) * size_of::<u32>();
+        width * rows * pixel + size_of::<u32>() + corners + 3 * (width + 2) + width
     }
 }
 
@@ -103,22 +118,65 @@ fn find_kernel(context: &RasterContext<'_>, band: &SampleBand, mixed: &mut Mixed
             }
         }
         mixed.join(y);
+        let before = mixed.columns.len();
+        mixed.sums.push(0);
         for x in 0..width {
             mixed.starts.push(mixed.columns.len() as u32);
             if mixed.is_mixed[x] != 0 {
                 mixed.columns.push(x as u16);
+                mixed.needs_few.push(mixed.is_mixed[x] >> breaks::HARD == 0);
             }
+            let above = mixed.sums[mixed.sums.len() - width - 1];
+            mixed.sums.push(above + (mixed.columns.len() - before) as u32);
         }
     }
     mixed.starts.push(mixed.columns.len() as u32);
 }
 
 impl MixedPixels {
+    /// Number of the mixed pixels up to the end of a shown row.
+    fn end_of(&self, row: u32, samples: &SampleBand) -> usize {
+        let rows = (row + 1 - samples.shown[0]) as usize;
+        self.starts[rows * samples.size_px[0] as usize] as usize
+    }
+
+    /// The row of a mixed pixel.
+    pub fn row_of(&self, i: usize, samples: &SampleBand) -> u32 {
+        let [first, end] = samples.shown;
+        (first..end).find(|&row| i < self.end_of(row, samples)).unwrap_or(first)
+    }
+
+    /// The first row of some mixed pixels, and the one after their last.
+    pub fn rows(&self, pixels: &Range<usize>, samples: &SampleBand) -> [i32; 2] {
+        let last = self.row_of(pixels.end.saturating_sub(1), samples);
+        [self.row_of(pixels.start, samples) as i32, last as i32 + 1]
+    }
+
+    /// Column and row of a mixed pixel. `row` is that of the one before it.
+    #[inline(always)]
+    pub fn place(&self, i: usize, samples: &SampleBand, row: &mut u32) -> [u32; 2] {
+        while i >= self.end_of(*row, samples) {
+            *row += 1;
+        }
+        [u32::from(self.columns[i]), *row]
+    }
+
+    /// True if none of the pixels from the first to the last column and row is mixed; rows are counted from the first
+    /// shown one.
+    #[inline(always)]
+    pub fn are_none_in(&self, [left, right]: [usize; 2], [top, bottom]: [usize; 2], width: usize) -> bool {
+        let at = |x: usize, y: usize| self.sums[y * (width + 1) + x];
+        let [above, below] = [top, bottom + 1].map(|y| at(right + 1, y) - at(left, y));
+        below == above
+    }
+
     /// Marks the mixed pixels of a row: those where colours break off in the pixel, in one beside, above or below it, or
     /// on the way from its first sample to theirs.
     #[inline(always)]
     fn join(&mut self, y: i32) {
-        use breaks::{LEFT, OWN, UPPER};
+        const OWN: u8 = breaks::OWN | breaks::OWN << breaks::HARD;
+        const LEFT: u8 = breaks::LEFT | breaks::LEFT << breaks::HARD;
+        const UPPER: u8 = breaks::UPPER | breaks::UPPER << breaks::HARD;
         let [above, own, below] = [y - 1, y, y + 1].map(|y| &self.breaks[y.rem_euclid(3) as usize].values[..]);
         for (x, out) in self.is_mixed.iter_mut().enumerate() {
             let beside = own[x] & OWN | own[x + 1] | own[x + 2] & (OWN | LEFT);
@@ -145,18 +203,22 @@ fn breaks_at(context: &RasterContext<'_>, band: &SampleBand, [x, y]: [i32; 2], p
     let ids = ids_of(x, y);
     let mut found = 0;
     for s in 1..ids.len() {
-        if !pairs.goes_on(context, ids[s - 1], ids[s]) {
-            found |= breaks::OWN;
-            break;
+        found |= pairs.step(context, ids[s - 1], ids[s]).breaks(breaks::OWN);
+    }
+    found |= pairs.step(context, ids_of(x - 1, y)[0], ids[0]).breaks(breaks::LEFT);
+    found | pairs.step(context, ids_of(x, y - 1)[0], ids[0]).breaks(breaks::UPPER)
+}
+
+impl Step {
+    /// The bits of this step, given that of its place.
+    #[inline(always)]
+    fn breaks(self, place: u8) -> u8 {
+        match self {
+            Self::None => 0,
+            Self::Slight => place,
+            Self::Hard => place | place << breaks::HARD,
         }
     }
-    if !pairs.goes_on(context, ids_of(x - 1, y)[0], ids[0]) {
-        found |= breaks::LEFT;
-    }
-    if !pairs.goes_on(context, ids_of(x, y - 1)[0], ids[0]) {
-        found |= breaks::UPPER;
-    }
-    found
 }
 
 /// Marks the pixels of a row, from the one left of the picture to the one right of it, whose samples

@@ -14,8 +14,11 @@ use crate::plan::{ShadedMaterial, SurfacePass, TEXTURE_NONE, flags};
 const BROKEN: u32 = flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::DEBUG | flags::WIRES | flags::BY_ANGLE;
 
 /// Largest difference of two values, squared, over their sum, up to which faces look alike: normals that
-/// differ by about 12 degrees, or colours by about 22/255.
-const ALIKE: f32 = 1.0 / 64.0;
+/// differ by about 14 degrees, or colours by about 25/255.
+const ALIKE: f32 = 1.0 / 48.0;
+
+/// The same up to which they differ slightly: normals by about 50 degrees.
+const SLIGHT: f32 = 1.0 / 4.0;
 
 /// Added to normals, so that all values are above 0.
 const NORMAL_SHIFT: f32 = 1.5;
@@ -38,6 +41,17 @@ const MANY_COLORED: u32 = flags::DERIVATIVE_NORMALS
     | flags::BY_ANGLE
     | flags::MASK
     | flags::BLEND;
+
+/// How colours go from one face to another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// They go on: the faces are the same, look alike, or are linked.
+    None,
+    /// They break off, though not by much.
+    Slight,
+    /// They break off.
+    Hard,
+}
 
 /// Ranges of what decides colours, of one face or of several.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,16 +111,24 @@ impl Look {
         all
     }
 
-    /// True if the colours of these faces and those hardly differ.
+    /// How the colours of these faces differ from those.
     #[inline(always)]
-    fn is_like(&self, other: &Self) -> bool {
+    fn step_to(&self, other: &Self) -> Step {
         let all = self.and(other);
-        let mut is_like = all.keys[0] == all.keys[1];
-        for k in 0..3 {
-            let difference = all.high[k] - all.low[k];
-            is_like &= difference * difference <= ALIKE * (all.high[k] + all.low[k]);
+        if all.keys[0] != all.keys[1] {
+            return Step::Hard;
         }
-        is_like
+        let (mut is_like, mut is_near) = (true, true);
+        for k in 0..3 {
+            let (difference, sum) = (all.high[k] - all.low[k], all.high[k] + all.low[k]);
+            is_like &= difference * difference <= ALIKE * sum;
+            is_near &= difference * difference <= SLIGHT * sum;
+        }
+        match (is_like, is_near) {
+            (true, _) => Step::None,
+            (false, true) => Step::Slight,
+            (false, false) => Step::Hard,
+        }
     }
 }
 
@@ -116,7 +138,7 @@ pub struct Pairs([Pair; Pairs::COUNT]);
 #[derive(Clone, Copy)]
 struct Pair {
     ids: [u32; 2],
-    goes_on: bool,
+    step: Step,
 }
 
 impl Pairs {
@@ -124,27 +146,31 @@ impl Pairs {
 
     /// None but of nothing and nothing.
     pub fn new() -> Self {
-        Self([Pair { ids: [NOTHING; 2], goes_on: true }; Self::COUNT])
+        Self([Pair { ids: [NOTHING; 2], step: Step::None }; Self::COUNT])
     }
 
-    /// True if colours go on from one of two ids to the other: they are the same, look alike, or are linked.
+    /// How colours go from one of two ids to the other.
     #[inline(always)]
-    pub fn goes_on(&mut self, context: &RasterContext<'_>, a: u32, b: u32) -> bool {
+    pub fn step(&mut self, context: &RasterContext<'_>, a: u32, b: u32) -> Step {
         if a == b {
-            return true;
+            return Step::None;
         }
         let ids = [a.min(b), a.max(b)];
         let place = &mut self.0[ids[0].wrapping_mul(5).wrapping_add(ids[1]) as usize % Self::COUNT];
         if place.ids != ids {
-            *place = Pair { ids, goes_on: goes_on(context, ids) };
+            *place = Pair { ids, step: step(context, ids) };
         }
-        place.goes_on
+        place.step
     }
 }
 
 #[inline(never)]
-fn goes_on(context: &RasterContext<'_>, [a, b]: [u32; 2]) -> bool {
-    Look::of(context, a).is_like(&Look::of(context, b)) || are_linked(context, a, b)
+fn step(context: &RasterContext<'_>, [a, b]: [u32; 2]) -> Step {
+    match Look::of(context, a).step_to(&Look::of(context, b)) {
+        Step::None => Step::None,
+        _ if are_linked(context, a, b) => Step::None,
+        step => step,
+    }
 }
 
 #[inline(always)]

@@ -5,54 +5,68 @@
 
 use std::arch::x86_64::*;
 
-use super::points::{PLACES, PointSet};
+use super::points::{Lattice, PointSet};
 use crate::backend::cpu::isa::LANES;
 use crate::backend::sample_partition::{GENERATORS, POINTS};
 
-/// Rows from a point to the one that is [`LANES`] later, where the pixel does not end between them.
-const ROWS: i32 = (LANES * GENERATORS[1] % POINTS) as i32;
+/// Vectors of a word's points.
+const VECTORS: usize = u64::BITS as usize / LANES;
 
-/// By point: all bits if the pixel ends between its row and that of the point that is [`LANES`] later, else none.
-const WRAPS: [[i32; LANES]; POINTS / LANES] = {
-    let mut wraps = [[0; LANES]; POINTS / LANES];
-    let mut i = 0;
-    while i < POINTS {
-        wraps[i / LANES][i % LANES] = if PLACES[1][i] + ROWS >= POINTS as i32 { -1 } else { 0 };
-        i += 1;
-    }
-    wraps
-};
+/// From a point to the one that is [`LANES`] later.
+struct Steps<const W: usize>;
 
-/// Points whose bits are found together.
-const TOGETHER: usize = 4 * LANES;
+impl<const W: usize> Steps<W> {
+    /// Columns.
+    const COLUMNS: i32 = (LANES * Lattice::<W>::STEP * GENERATORS[0]) as i32;
+
+    /// Rows, where the pixel does not end between them.
+    const ROWS: i32 = (LANES * Lattice::<W>::STEP * GENERATORS[1] % POINTS) as i32;
+
+    /// By point: all bits if the pixel ends between its row and that of the later point, else none.
+    const WRAPS: [[[i32; LANES]; VECTORS]; W] = {
+        let mut wraps = [[[0; LANES]; VECTORS]; W];
+        let mut i = 0;
+        while i < Lattice::<W>::POINTS {
+            let (word, bit) = (i / u64::BITS as usize, i % u64::BITS as usize);
+            let row = Lattice::<W>::PLACES[1][word][bit];
+            wraps[word][bit / LANES][bit % LANES] = if row + Self::ROWS >= POINTS as i32 { -1 } else { 0 };
+            i += 1;
+        }
+        wraps
+    };
+}
 
 /// As `triangle::outside`.
 #[inline]
 #[target_feature(enable = "avx2")]
-pub fn outside([c, dx, dy]: [i32; 3]) -> PointSet {
-    let mut bits = [0_u32; POINTS / TOGETHER];
+pub fn outside<const W: usize>([c, dx, dy]: [i32; 3]) -> PointSet<W> {
     // All sums are modulo 2^32.
-    let along = |change: i32, places: &[i32; POINTS]| {
-        _mm256_mullo_epi32(_mm256_set1_epi32(change), load(&places.as_chunks::<LANES>().0[0]))
+    let along = |change: i32, places: &[[i32; 64]; W]| {
+        _mm256_mullo_epi32(_mm256_set1_epi32(change), load(&places[0].as_chunks::<LANES>().0[0]))
     };
-    let start = _mm256_sub_epi32(along(dx, &PLACES[1]), along(dy, &PLACES[0]));
+    let start = _mm256_sub_epi32(along(dx, &Lattice::<W>::PLACES[1]), along(dy, &Lattice::<W>::PLACES[0]));
     let mut value = _mm256_add_epi32(_mm256_set1_epi32(c), start);
-    let step = _mm256_set1_epi32(dx.wrapping_mul(ROWS).wrapping_sub(dy.wrapping_mul(LANES as i32)));
-    let pixel = _mm256_set1_epi32(dx.wrapping_mul(POINTS as i32));
-    for (bits, wraps) in bits.iter_mut().zip(WRAPS.as_chunks::<4>().0) {
-        let mut four = [value; 4];
-        for (own, wraps) in four.iter_mut().zip(wraps) {
-            *own = value;
-            let wrap = _mm256_and_si256(pixel, load(wraps));
-            value = _mm256_add_epi32(value, _mm256_sub_epi32(step, wrap));
+    let step = dx.wrapping_mul(Steps::<W>::ROWS).wrapping_sub(dy.wrapping_mul(Steps::<W>::COLUMNS));
+    let (step, pixel) = (_mm256_set1_epi32(step), _mm256_set1_epi32(dx.wrapping_mul(POINTS as i32)));
+    let mut set = PointSet::NONE;
+    for (word, wraps) in set.0.iter_mut().zip(&Steps::<W>::WRAPS) {
+        let mut halves = [0_u32; 2];
+        for (bits, wraps) in halves.iter_mut().zip(wraps.as_chunks::<4>().0) {
+            let mut four = [value; 4];
+            for (own, wraps) in four.iter_mut().zip(wraps) {
+                *own = value;
+                let wrap = _mm256_and_si256(pixel, load(wraps));
+                value = _mm256_add_epi32(value, _mm256_sub_epi32(step, wrap));
+            }
+            // Narrowing keeps signs, and interleaves the halves of vectors.
+            let [a, b, c, d] = four;
+            let bytes = _mm256_packs_epi16(_mm256_packs_epi32(a, b), _mm256_packs_epi32(c, d));
+            let in_order = _mm256_permutevar8x32_epi32(bytes, _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7));
+            *bits = _mm256_movemask_epi8(in_order) as u32;
         }
-        // Narrowing keeps signs, and interleaves the halves of vectors.
-        let [a, b, c, d] = four;
-        let bytes = _mm256_packs_epi16(_mm256_packs_epi32(a, b), _mm256_packs_epi32(c, d));
-        let in_order = _mm256_permutevar8x32_epi32(bytes, _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7));
-        *bits = _mm256_movemask_epi8(in_order) as u32;
+        *word = u64::from(halves[0]) | u64::from(halves[1]) << 32;
     }
-    PointSet(std::array::from_fn(|w| u64::from(bits[2 * w]) | u64::from(bits[2 * w + 1]) << 32))
+    set
 }
 
 #[inline]

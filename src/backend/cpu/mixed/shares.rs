@@ -5,22 +5,22 @@ use crate::backend::sample_partition::POINTS;
 
 /// A triangle's share of a pixel.
 #[derive(Clone, Copy, Debug)]
-pub struct Share {
+pub struct Share<const W: usize> {
     /// The triangle.
     pub id: u32,
     /// The points that see it.
-    pub points: PointSet,
+    pub points: PointSet<W>,
     /// Its depth at the first of them.
     pub depth: f32,
 }
 
 /// The shares of a pixel's triangles, in the order of their first points.
-pub struct Shares {
-    list: [Share; POINTS],
+pub struct Shares<const W: usize> {
+    list: [Share<W>; POINTS],
     len: usize,
 }
 
-impl Shares {
+impl<const W: usize> Shares<W> {
     /// None.
     pub fn new() -> Self {
         Self { list: [Share { id: 0, points: PointSet::NONE, depth: 0.0 }; POINTS], len: 0 }
@@ -34,13 +34,23 @@ impl Shares {
 
     /// All of them.
     #[inline(always)]
-    pub fn all(&self) -> &[Share] {
+    pub fn all(&self) -> &[Share<W>] {
         &self.list[..self.len]
+    }
+
+    /// The points of all of them.
+    #[inline(always)]
+    pub fn points(&self) -> PointSet<W> {
+        let mut all = PointSet::NONE;
+        for share in self.all() {
+            all = all.or(share.points);
+        }
+        all
     }
 
     /// Adds one that comes after the others.
     #[inline(always)]
-    pub fn push(&mut self, share: Share) {
+    pub fn push(&mut self, share: Share<W>) {
         self.list[self.len] = share;
         self.len += 1;
     }
@@ -53,7 +63,7 @@ impl Shares {
 
     /// Adds one where it belongs. Pieces of a triangle become one share.
     #[inline(always)]
-    pub fn insert(&mut self, mut share: Share) {
+    pub fn insert(&mut self, mut share: Share<W>) {
         let mut kept = 0;
         for i in 0..self.len {
             let other = self.list[i];

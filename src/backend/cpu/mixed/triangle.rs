@@ -3,24 +3,38 @@
 //! Points lie in the middle of 1/256 px, so edge functions are taken in halves of it. The rest is as in
 //! stage visibility: exact signs with the top-left rule, depth from offsets.
 
-use super::points::{PLACE_MAX, PLACES, PointSet};
+use super::points::{Lattice, PLACE_MAX, PointSet};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility::{Setup, area, clamp};
 use crate::backend::cpu::isa::Isa;
 
 /// A triangle, ready to be offered to pixels.
+#[derive(Clone, Debug)]
 pub struct PointTriangle {
+    /// The triangle that it is, or is a piece of.
+    pub id: u32,
     corners: [ScreenVertex; 3],
-    /// The first corner of each edge, in an order that makes the area positive.
-    x: [i32; 3],
-    y: [i32; 3],
-    dx: [i32; 3],
-    dy: [i32; 3],
-    bias: [i64; 3],
+    edges: Edges,
     /// The nearest depth of its corners.
     pub nearest: f32,
     /// Of its depth: found when a pixel asks for it.
     setup: Option<Setup>,
+}
+
+/// The edges of a triangle, in an order that makes the area positive. The fourth has everything inside.
+#[derive(Clone, Copy, Debug)]
+struct Edges {
+    /// The first corner.
+    x: [i32; 4],
+    y: [i32; 4],
+    dx: [i32; 4],
+    dy: [i32; 4],
+    /// What is added for half of a 1/256 px, and for the top-left rule.
+    bias: [i32; 4],
+    /// By how much the function grows from the first column and row to others, at most.
+    growth: [i32; 4],
+    /// The same, at least.
+    decline: [i32; 4],
 }
 
 /// An edge function in a pixel: its value at the first point, halved, and its change per row and, negative, per column.
@@ -46,37 +60,36 @@ pub struct Plane {
 impl PointTriangle {
     /// None where the triangle has no area.
     #[inline(always)]
-    pub fn new(corners: &[ScreenVertex; 3]) -> Option<Self> {
+    pub fn new(id: u32, corners: &[ScreenVertex; 3]) -> Option<Self> {
         let area = area(corners);
         if area == 0 {
             return None;
         }
         let [a, b, c] = *corners;
         let [b, c] = if area > 0 { [b, c] } else { [c, b] };
-        let (x, y) = ([a.x, b.x, c.x], [a.y, b.y, c.y]);
-        let (mut dx, mut dy, mut bias) = ([0; 3], [0; 3], [0; 3]);
-        for k in 0..3 {
-            (dx[k], dy[k]) = (x[(k + 1) % 3] - x[k], y[(k + 1) % 3] - y[k]);
-            bias[k] = if dy[k] < 0 || (dy[k] == 0 && dx[k] > 0) { 0 } else { -1 };
-        }
-        Some(Self { corners: *corners, x, y, dx, dy, bias, nearest: a.z.max(b.z).max(c.z), setup: None })
+        let nearest = a.z.max(b.z).max(c.z);
+        Some(Self { id, corners: *corners, edges: Edges::of([a.x, b.x, c.x], [a.y, b.y, c.y]), nearest, setup: None })
     }
 
     /// The triangle in the pixel with this upper left corner, 1/256 px from the picture's centre; None where no point of the
     /// pixel is inside.
     #[inline(always)]
     pub fn at(&self, corner: [i32; 2]) -> Option<Outline> {
-        const MAX: i64 = PLACE_MAX as i64;
+        let Edges { x, y, dx, dy, bias, growth, decline } = &self.edges;
+        let mut first = [0_i64; 4];
+        let mut all = 0;
+        for k in 0..4 {
+            let [px, py] = [corner[0] - x[k], corner[1] - y[k]].map(i64::from);
+            first[k] = i64::from(dx[k]) * py - i64::from(dy[k]) * px + i64::from(bias[k]);
+            all |= first[k] + i64::from(growth[k]);
+        }
+        if all < 0 {
+            return None;
+        }
         let mut edges = [NO_EDGE; 3];
         for k in 0..3 {
-            let (dx, dy) = (i64::from(self.dx[k]), i64::from(self.dy[k]));
-            let (px, py) = (i64::from(corner[0] - self.x[k]), i64::from(corner[1] - self.y[k]));
-            let c = (2 * (dx * py - dy * px) + (dx - dy) + self.bias[k]) >> 1;
-            if c + (MAX * dx).max(0) + (MAX * -dy).max(0) < 0 {
-                return None;
-            }
-            if c + (MAX * dx).min(0) + (MAX * -dy).min(0) < 0 {
-                edges[k] = [c.clamp(-(1 << 30), 1 << 30) as i32, self.dx[k], self.dy[k]];
+            if first[k] + i64::from(decline[k]) < 0 {
+                edges[k] = [first[k].clamp(-(1 << 30), 1 << 30) as i32, dx[k], dy[k]];
             }
         }
         Some(Outline(edges))
@@ -100,14 +113,32 @@ impl PointTriangle {
     }
 }
 
+impl Edges {
+    #[inline(always)]
+    fn of([ax, bx, cx]: [i32; 3], [ay, by, cy]: [i32; 3]) -> Self {
+        let (x, y) = ([ax, bx, cx, cx], [ay, by, cy, cy]);
+        let (dx, dy) = ([bx - ax, cx - bx, ax - cx, 0], [by - ay, cy - by, ay - cy, 0]);
+        let (mut bias, mut growth, mut decline) = ([0; 4], [0; 4], [0; 4]);
+        for k in 0..4 {
+            // The fourth edge is one of those that own their points.
+            let is_own = dy[k] < 0 || (dy[k] == 0 && dx[k] >= 0);
+            // Functions are halves of (2 E + dx - dy - 1 or 0), rounded down.
+            bias[k] = (dx[k] - dy[k] - i32::from(!is_own)) >> 1;
+            growth[k] = PLACE_MAX * (dx[k].max(0) + (-dy[k]).max(0));
+            decline[k] = PLACE_MAX * (dx[k].min(0) + (-dy[k]).min(0));
+        }
+        Self { x, y, dx, dy, bias, growth, decline }
+    }
+}
+
 impl Plane {
     /// The depth of nothing, for places that wait to be used.
     pub const EMPTY: Self = Self { from: [0; 2], depth: [0.0; 3], range: [0.0; 2] };
 
-    /// The depth at point `i`.
+    /// The depth at point `i` of those of which sets have `W` words.
     #[inline(always)]
-    pub fn at(&self, i: usize) -> f32 {
-        self.at_place([PLACES[0][i], PLACES[1][i]])
+    pub fn at<const W: usize>(&self, i: usize) -> f32 {
+        self.at_place(Lattice::<W>::place(i))
     }
 
     #[inline(always)]
@@ -129,7 +160,7 @@ impl Plane {
 impl Outline {
     /// The points inside.
     #[inline(always)]
-    pub fn inside(&self, isa: Isa) -> PointSet {
+    pub fn inside<const W: usize>(&self, isa: Isa) -> PointSet<W> {
         let mut inside = PointSet::ALL;
         for edge in self.0 {
             if edge != NO_EDGE {
@@ -143,7 +174,7 @@ impl Outline {
 /// The points that lie outside an edge.
 #[inline(always)]
 #[allow(unsafe_code)]
-fn outside(isa: Isa, edge: Edge) -> PointSet {
+fn outside<const W: usize>(isa: Isa, edge: Edge) -> PointSet<W> {
     #[cfg(target_arch = "x86_64")]
     if isa.has_avx2() {
         // SAFETY: `has_avx2` is true where the processor has AVX2.
@@ -155,13 +186,17 @@ fn outside(isa: Isa, edge: Edge) -> PointSet {
 
 /// The points that lie outside an edge, one by one.
 #[inline(always)]
-fn outside_plainly([c, dx, dy]: Edge) -> PointSet {
-    PointSet::of(|i| c.wrapping_add(dx.wrapping_mul(PLACES[1][i]).wrapping_sub(dy.wrapping_mul(PLACES[0][i]))) < 0)
+fn outside_plainly<const W: usize>([c, dx, dy]: Edge) -> PointSet<W> {
+    PointSet::of(|i| {
+        let [column, row] = Lattice::<W>::place(i);
+        c.wrapping_add(dx.wrapping_mul(row).wrapping_sub(dy.wrapping_mul(column))) < 0
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::backend::cpu::mixed::points::ALL_WORDS;
     use crate::backend::sample_partition::POINTS;
 
     /// Numbers that look random: xorshift64, Marsaglia 2003.
@@ -180,10 +215,12 @@ mod tests {
             let shift = next(&mut state).rem_euclid(16);
             let [dx, dy] = [0, 1].map(|_| next(&mut state) >> (8 + shift));
             let c = (next(&mut state) >> shift).clamp(-(1 << 30), 1 << 30);
-            let want = outside_plainly([c, dx, dy]);
+            let want = outside_plainly::<ALL_WORDS>([c, dx, dy]);
+            let of_few = outside_plainly::<1>([c, dx, dy]);
             mixed += usize::from(want != PointSet::NONE && want != PointSet::ALL);
             for isa in Isa::available() {
                 assert_eq!(outside(isa, [c, dx, dy]), want, "{isa:?} {c} {dx} {dy}");
+                assert_eq!(outside(isa, [c, dx, dy]), of_few, "{isa:?} {c} {dx} {dy}");
             }
         }
         assert!(mixed > 2_000, "{mixed}");
@@ -201,11 +238,12 @@ mod tests {
                 ..ScreenVertex::default()
             };
             let corners = [0; 3].map(|_| corner(&mut state));
-            let Some(mut triangle) = PointTriangle::new(&corners) else { continue };
+            let Some(mut triangle) = PointTriangle::new(0, &corners) else { continue };
             let plane = triangle.plane_at([next(&mut state) >> 16, next(&mut state) >> 16]);
             let [low, high] = plane.extremes();
             for i in 0..POINTS {
-                assert!(low <= plane.at(i) && plane.at(i) <= high, "{plane:?}");
+                let depth = plane.at::<ALL_WORDS>(i);
+                assert!(low <= depth && depth <= high, "{plane:?}");
             }
             compared += 1;
         }

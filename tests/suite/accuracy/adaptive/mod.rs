@@ -12,13 +12,16 @@ use crate::oracle::surface::rays::{Pen, picture, shares};
 use crate::oracle::surface::srgb;
 use crate::oracle::vector::{V2, V3, cross, dot, unit};
 use crate::support::seen::{lights, material};
-use crate::support::truth::{Errors, Gate, cases, goal, points_per_side, renderers, scene};
+use crate::support::truth::{Errors, Gate, cases, goal, points_per_side, renderers, scene, segments};
 use crate::support::{scenes, shapes};
 
 /// Goal: pixels that show several faces, or a face and the background.
 const MIXED_GOAL: Gate = Gate { rmse: 1.5, max: 16.0, ink: f64::INFINITY };
 /// Goal: whole pictures.
 const WHOLE_GOAL: Gate = Gate { rmse: 0.5, max: f64::INFINITY, ink: f64::INFINITY };
+
+/// Whole pictures with lines, which err by themselves.
+const LINED_GATE: Gate = Gate { rmse: 1.0, max: f64::INFINITY, ink: f64::INFINITY };
 
 /// Points along a pixel's side that tell how many faces it shows.
 const TOLD_BY: u32 = 16;
@@ -41,6 +44,15 @@ const CASES: &[Case] = &[
     ("stacked boxes", shapes::stacked_boxes, "flat", "headlight"),
 ];
 
+/// Opaque lines over faces: along all of their borders, or along some.
+const LINED: &[Case] = &[
+    ("wired torus", || shapes::torus(24), "flat", "headlight"),
+    ("wired gear", || shapes::gear(9), "flat", "three-point"),
+    ("wired smooth torus", || shapes::torus(24), "smooth", "three-point"),
+    ("framed sheet", || shapes::sheet(12), "flat", "three-point"),
+    ("framed torus", || shapes::torus(24), "flat", "headlight"),
+];
+
 /// What a picture should be: linear colours, and which pixels show several faces.
 struct Truth {
     colors: Vec<V3>,
@@ -55,7 +67,11 @@ impl Truth {
         let (material, lights) = (material(plan.surface.as_ref().unwrap()), lights(plan));
         let shade = |triangle: u32, p: V2| lit(&material, &lights, normal_at(&scene, &normals, triangle, p));
         let background = [0, 1, 2].map(|k| f64::from(plan.background[k]));
-        let pen = Pen { segments: &[], width: 0.0, color: [0.0; 3] };
+        let pass = plan.lines.first();
+        let segments = pass.map_or_else(Vec::new, |_| segments(plan));
+        let line = pass.map_or([0.0; 3], |pass| [0, 1, 2].map(|k| f64::from(pass.color[k])));
+        let width = pass.map_or(0.0, |pass| f64::from(pass.width_px));
+        let pen = Pen { segments: &segments, width, color: line };
         let colors = picture(&screen, &pen, background, points_per_side(), shade);
         let size = [plan.width_px, plan.height_px];
         let is_mixed = |i: usize| {
@@ -97,10 +113,17 @@ fn normal_at(scene: &Scene, normals: &[[V3; 3]], triangle: u32, p: V2) -> V3 {
     unit([of(0), of(1), of(2)])
 }
 
-fn plan_of<'a>(mesh: &'a meshsnap::mesh::Mesh, (_, _, style, light): &Case) -> DrawPlan<'a> {
+fn plan_of<'a>(mesh: &'a meshsnap::mesh::Mesh, (name, _, style, light): &Case) -> DrawPlan<'a> {
     let size = cases("64x56", "320x280");
     let keys = [("size", size), ("style", style), ("light.preset", light), ("samples", "adaptive")];
-    let mut plan = scenes::plan(mesh, &scenes::spec(&[&keys[..], &[("surface.metallic", "0")]].concat()));
+    let mut keys = [&keys[..], &[("surface.metallic", "0")]].concat();
+    if name.starts_with("wired") {
+        keys.extend([("wire.thickness", "1.5"), ("wire.hidden", "hide"), ("wire.color", "012")]);
+    }
+    if name.starts_with("framed") {
+        keys.extend([("outline.method", "contour"), ("outline.thickness", "1.5"), ("outline.unit", "px")]);
+    }
+    let mut plan = scenes::plan(mesh, &scenes::spec(&keys));
     // The oracle knows no hollows.
     plan.occlusion = None;
     plan
@@ -137,6 +160,32 @@ fn whole_pictures_are_near_the_truth() {
             whole.rmse()
         ),
     );
+}
+
+/// Lines that lie along all borders of faces hide what adaptive samples see better than 16.
+#[test]
+fn lines_lie_over_mixed_pixels() {
+    let (mut missed, mut framed) = (Vec::new(), [Errors::default(); 2]);
+    let mut renderers = renderers();
+    for case in LINED {
+        let mesh = scenes::mesh(&(case.1)());
+        let mut plan = plan_of(&mesh, case);
+        assert!(plan.is_adaptive && plan.lines.len() == 1, "{}", case.0);
+        let truth = Truth::of(&plan, case.2 == "smooth");
+        let [mixed, whole] = truth.errors(renderers[0].as_mut(), &plan);
+        (plan.samples, plan.is_adaptive) = (16, false);
+        let [_, fixed] = truth.errors(renderers[0].as_mut(), &plan);
+        missed.extend(mixed.check(&format!("- {}, mixed, adaptive", case.0), MIXED_GOAL).err());
+        missed.extend(whole.check(&format!("- {}, whole, adaptive", case.0), LINED_GATE).err());
+        println!("  16 samples: {:.3}", fixed.rmse());
+        assert!(whole.rmse() < 1.03 * fixed.rmse(), "{}", case.0);
+        if case.0.starts_with("framed") {
+            framed[0].add(&whole);
+            framed[1].add(&fixed);
+        }
+    }
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+    assert!(framed[0].rmse() < 0.95 * framed[1].rmse(), "{framed:?}");
 }
 
 /// Pictures that are wrong in known ways do not get through: those of 4 samples, and of 16.

@@ -25,13 +25,13 @@ fn each_plan(mut each: impl FnMut(&str, &mut DrawPlan<'_>)) {
         let mut plan = scenes::plan(&mesh, &spec);
         let is_fixed = plan.warnings.iter().any(|warning| warning.code == "samples_fixed");
         assert_eq!((plan.is_adaptive, plan.samples), if is_fixed { (false, 16) } else { (true, 4) }, "{}", scene.name);
-        assert_eq!(is_fixed, !plan.lines.is_empty() || plan.peeling.is_some(), "{}", scene.name);
+        assert_eq!(is_fixed, !plan.is_shaded() || plan.peeling.is_some(), "{}", scene.name);
         if plan.is_adaptive {
             each(scene.name, &mut plan);
             plans += 1;
         }
     }
-    assert!(plans > 12, "{plans}");
+    assert!(plans > 20, "{plans}");
 }
 
 /// Shortcuts, threads (and with them the heights of bands) and instruction sets.
@@ -80,7 +80,9 @@ fn smooth_interiors_are_left_alone() {
         plan.is_adaptive = false;
         let differing = Likeness::of(&adaptive, &draw(&mut renderer, plan)).differing();
         assert_eq!(renderer.draw_times().mixed_pixels, 0);
-        assert!(differing > 50 && differing <= mixed, "{name}: {differing} differ, {mixed} are mixed");
+        // Lines may lie over all borders of faces.
+        let is_seen = differing > 50 || !plan.lines.is_empty();
+        assert!(is_seen && differing <= mixed, "{name}: {differing} differ, {mixed} are mixed");
         let all = (plan.width_px * plan.height_px) as usize;
         assert!(mixed < all / 2 || name.contains("sheet"), "{name}: {mixed} of {all}");
     });
@@ -200,11 +202,11 @@ fn shared_edges_have_each_point_once() {
 #[test]
 fn pictures_that_cannot_have_them_say_so() {
     let mesh = scenes::mesh(&shapes::cube());
-    let spec = scenes::spec(&[("samples", "adaptive"), ("style", "wire")]);
+    let spec = scenes::spec(&[("samples", "adaptive"), ("style", "wireframe")]);
     let plan = scenes::plan(&mesh, &spec);
     assert_eq!((plan.samples, plan.is_adaptive), (16, false));
     let [warning] = &plan.warnings[..] else { panic!("{:?}", plan.warnings) };
-    let said = "image.samples is adaptive, and lines are drawn over faces: each pixel has 16 samples instead";
+    let said = "image.samples is adaptive, and no face is filled: each pixel has 16 samples instead";
     assert_eq!((warning.code, warning.detail.as_str()), ("samples_fixed", said));
     let glass = scenes::plan(&mesh, &scenes::spec(&[("samples", "adaptive"), ("surface.opacity", "0.5")]));
     assert!(glass.warnings[0].detail.contains("something is transparent"), "{:?}", glass.warnings);
