@@ -115,6 +115,9 @@ struct Batch {
     cleared: u32,
     // Where the batch's first pixel is in the bytes of the picture.
     rgba_at: u32,
+    // Numbers of the first mixed pixel whose points the buffer holds, and of the one after the last.
+    slots_first: u32,
+    slots_end: u32,
 };
 
 // Threads of a workgroup, in every kernel.

@@ -1,6 +1,7 @@
 // Stage visibility, per tile of 64 x 64 pixels of a triangle that a workgroup draws: first each thread tests a
 // block of 8 x 8 pixels against the edges, then all threads together fill the blocks that are left, one thread per
-// pixel. Shared by visibility_tile.wgsl and visibility_few.wgsl. No twin: the CPU has one loop for all sizes.
+// pixel. Shared by visibility_tile.wgsl and visibility_few.wgsl. What a pixel's thread does is in tile_samples.wgsl
+// or, for mixed pixels, in mixed/points.wgsl. No twin: the CPU has one loop for all sizes.
 
 // Pixels along a side of a tile.
 const TILE_PX: i32 = 64;
@@ -27,8 +28,8 @@ fn draw_tile(s: Setup, e: Edges, bounds: vec4<i32>, tile: vec2<i32>, thread: i32
     let block = tile + 8 * vec2(thread & 7, thread >> 3u);
     if all(block <= bounds.zw) {
         let values = edge_values(s, e, sample_corner(block));
-        // The largest each edge function can be in the block.
-        let most = values + max(e.dx, vec3(0)) * 127 + max(-e.dy, vec3(0)) * 127;
+        // No edge function is larger anywhere in the block.
+        let most = values + max(e.dx, vec3(0)) * 128 + max(-e.dy, vec3(0)) * 128;
         if (most.x | most.y | most.z) >= 0 {
             blocks[atomicAdd(&block_count, 1u)] = vec4(values, thread);
         }
@@ -45,21 +46,6 @@ fn draw_tile(s: Setup, e: Edges, bounds: vec4<i32>, tile: vec2<i32>, thread: i32
     }
     // The list must not be emptied while another thread reads it.
     workgroupBarrier();
-}
-
-fn draw_pixel(s: Setup, e: Edges, values: vec3<i32>, in_block: vec2<i32>, pixel: vec2<i32>, id: u32) {
-    let corner = sample_corner(pixel);
-    for (var n = 0; n < sample_count(); n++) {
-        let offset = sample_step(n);
-        let at = 16 * in_block + offset;
-        let value = values + e.dx * at.y - e.dy * at.x;
-        if (value.x | value.y | value.z) >= 0 {
-            let z = depth_at(s, corner + 16 * offset);
-            if z > 0.0 {
-                emit(pixel, n, z, id);
-            }
-        }
-    }
 }
 
 // Edge values in sixteenths at a pixel's sample corner, exact for the 8 x 8 pixels from there.

@@ -2,10 +2,6 @@
 // composite.wgsl, each of which defines triangle_of_sample(sample).
 
 @group(1) @binding(24) var<storage, read> pass_masks: array<u32>;
-// Colours, then the materials of the surface's triangles and of the hull's.
-@group(1) @binding(25) var<storage, read> hull_materials: array<u32>;
-
-const NOTHING: u32 = 0xFFFFFFFFu;
 
 struct Group {
     id: u32,
@@ -56,20 +52,4 @@ fn group_color(g: Group, pixel: vec2<i32>, show: Show) -> vec4<f32> {
     }
     let mean = rn2(vec2<f32>(g.offset_sum) * recip(f32(g.count)));
     return point_color(g.id, vec2<f32>(pixel_corner(pixel)) + mean, show);
-}
-
-// Material index of a triangle, of the surface or of the outline mesh.
-fn hull_material(id: u32) -> u32 {
-    if has(HULL_MATERIALS) {
-        return hull_materials[4u * frame.hull_color_count + id];
-    }
-    return 0u;
-}
-
-fn hull_color(id: u32) -> vec4<f32> {
-    if !has(HULL_MATERIALS) {
-        return frame.hull_color;
-    }
-    let at = 4u * min(hull_material(id), frame.hull_color_count - 1u);
-    return bitcast<vec4<f32>>(vec4(hull_materials[at], hull_materials[at + 1u], hull_materials[at + 2u], hull_materials[at + 3u]));
 }

@@ -166,7 +166,7 @@ fn filtered(image: Image, lod: f32, at: vec2<f32>, sampler: u32) -> vec4<f32> {
     let share = lod - f32(level);
     let fine = bilinear(image, level, at, sampler);
     if share > 0.0 {
-        return mixed(fine, bilinear(image, level + 1u, at, sampler), share);
+        return between(fine, bilinear(image, level + 1u, at, sampler), share);
     }
     return fine;
 }
@@ -192,9 +192,9 @@ fn bilinear(image: Image, level_in: u32, at: vec2<f32>, sampler: u32) -> vec4<f3
     let first = i32(level_start(image, level));
     let upper_row = first + down.low * size.x;
     let lower_row = first + down.high * size.x;
-    let upper = mixed(texel(upper_row + across.low), texel(upper_row + across.high), across.share);
-    let lower = mixed(texel(lower_row + across.low), texel(lower_row + across.high), across.share);
-    return mixed(upper, lower, down.share);
+    let upper = between(texel(upper_row + across.low), texel(upper_row + across.high), across.share);
+    let lower = between(texel(lower_row + across.low), texel(lower_row + across.high), across.share);
+    return between(upper, lower, down.share);
 }
 
 fn nearest(image: Image, level_in: u32, at: vec2<f32>, sampler: u32) -> vec4<f32> {
@@ -257,6 +257,6 @@ fn texel(index: i32) -> vec4<f32> {
     return vec4(unpack2x16float(halves.x), unpack2x16float(halves.y));
 }
 
-fn mixed(a: vec4<f32>, b: vec4<f32>, share: f32) -> vec4<f32> {
+fn between(a: vec4<f32>, b: vec4<f32>, share: f32) -> vec4<f32> {
     return a + rn4((b - a) * share);
 }

@@ -14,16 +14,21 @@ use super::cpu::geometry::transform::{GUARD, OUTSIDE, ScreenVertex};
 use super::cpu::geometry::{clip, samples};
 use super::cpu::lines::holes::{self, inset};
 use super::cpu::lines::{coverage, hidden_lines, segment, stroke};
+use super::cpu::mixed::find::breaks;
+use super::cpu::mixed::look::{self, kinds};
+use super::cpu::mixed::{points, triangle};
 use super::cpu::occlusion;
 use super::cpu::surface::{light, texture};
 use super::gpu::params::{Batch, FACES_BACK, FACES_BOTH, FACES_FRONT, Frame, OWN_TRIANGLES, line_flags};
 use super::gpu::pipelines::{Access, Kernel, SampleTarget, SampleWrite, Slot, key};
-use super::gpu::schedule::sizes::{JOBS_MAX, PEEL_STATE_BYTES, STROKES_BYTES, WORK_HEAD_BYTES, WORK_ITEM_BYTES};
+use super::gpu::schedule::sizes::{
+    JOBS_MAX, MIXED_HEAD_BYTES, PEEL_STATE_BYTES, STROKES_BYTES, WORK_HEAD_BYTES, WORK_ITEM_BYTES,
+};
 use super::gpu::schedule::{PIECES_MAX, WORKGROUP, line_shares, tiles};
 use super::sample_partition::{GENERATORS, POINTS};
 use crate::plan::{
-    Edge, HullVertex, LinePass, ShadedMaterial, TAPS_PER_PIXEL, Texture, debug_views, flags, pass_mask, sample_offsets,
-    samplers, slots,
+    Edge, HullVertex, LinePass, ShadedMaterial, TAPS_PER_PIXEL, TEXTURE_NONE, Texture, debug_views, flags, pass_mask,
+    sample_offsets, samplers, slots,
 };
 
 /// Every constant that a shader and Rust both have, as the shader calls it.
@@ -90,6 +95,24 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("MARKED" = holes::MARKED, "STROKED" = holes::STROKED, "CROSSING_PX" = holes::CROSSING_PX);
     add!("FACES_MAX" = holes::FACES_MAX, "HOLE_UNIT" = inset::HOLE_UNIT);
     add!("INSIDE" = inset::INSIDE, "NARROW_PX" = inset::NARROW_PX, "LEVEL_PX" = inset::LEVEL_PX);
+    // Mixed pixels.
+    add_same!("", kinds: BY_NORMAL BY_COLOR UNIQUE);
+    add_same!("BREAKS_", breaks: OWN LEFT UPPER HARD);
+    add!("ALIKE" = look::ALIKE, "SLIGHT" = look::SLIGHT, "NORMAL_SHIFT" = look::NORMAL_SHIFT);
+    add!(
+        "MATERIAL_VERTEX_NORMALS" = flags::VERTEX_NORMALS,
+        "TEXTURE_NONE" = TEXTURE_NONE,
+        "TEXTURE_SLOTS" = slots::COUNT
+    );
+    add!("HEAD_WORDS" = MIXED_HEAD_BYTES / 4, "PLACE_MAX" = points::PLACE_MAX, "FEW_STEP" = points::Lattice::<1>::STEP);
+    add!("FEW_FIRST" = points::Lattice::<1>::FIRST, "EDGE_MAX" = triangle::EDGE_MAX);
+    let of_all_levels = |places: u8| places | places << breaks::HARD;
+    add!(
+        "OWN_PLACES" = of_all_levels(breaks::OWN),
+        "LEFT_PLACES" = of_all_levels(breaks::OWN | breaks::LEFT),
+        "UPPER_PLACES" = of_all_levels(breaks::OWN | breaks::UPPER),
+        "HARD_PLACES" = (breaks::OWN | breaks::LEFT | breaks::UPPER) << breaks::HARD,
+    );
     // Occlusion.
     add!("NOWHERE" = occlusion::grid::NOWHERE, "BIAS" = occlusion::gather::BIAS, "GAIN" = occlusion::gather::GAIN);
     add!("SHOULDER" = light::SHOULDER);
@@ -125,6 +148,10 @@ const SHADER_ONLY: &[&str] = &[
     "MASK_WORD",
     "SLACK_WORD",
     "HOLE_WORD",
+    "FEW",
+    "STEP_NONE",
+    "STEP_SLIGHT",
+    "STEP_HARD",
 ];
 
 /// Every kernel in each of its variants.
@@ -140,9 +167,10 @@ fn kernels() -> Vec<Kernel> {
         Kernel::Coverage,
     ];
     all.extend([Kernel::Holes, Kernel::LineLight, Kernel::Resolve, Kernel::Paint]);
+    all.extend([Kernel::Breaks, Kernel::MixedPixels, Kernel::MixedColor]);
     for write in [SampleWrite::Both, SampleWrite::Depth, SampleWrite::Id] {
         all.push(Kernel::VisibilityFew { write });
-        for target in [SampleTarget::Visibility, SampleTarget::Layer] {
+        for target in [SampleTarget::Visibility, SampleTarget::Layer, SampleTarget::Points] {
             all.extend([Kernel::Visibility { write, target }, Kernel::VisibilityTile { write, target }]);
         }
     }
@@ -230,7 +258,7 @@ fn layouts() -> Vec<(&'static str, Layout)> {
                 first count faces row_first row_end capacity large_first large_end huge_first huge_end edges_per_group
                 line_width line_smoothing line_flags line_exponent line_windows line_slices line_peak line_units
                 line_pass seen_first seen_end samples_at pass_bit layer column_first column_end seen_margin
-                alone_size groups_each cleared rgba_at
+                alone_size groups_each cleared rgba_at slots_first slots_end
             }),
         ),
         (

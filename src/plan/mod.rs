@@ -192,6 +192,11 @@ impl<'a> DrawPlan<'a> {
         self.line_margin_rows().max(u32::from(self.is_adaptive))
     }
 
+    /// True if some pixels may be drawn from coverage points.
+    pub fn has_mixed(&self) -> bool {
+        self.is_adaptive && self.is_shaded()
+    }
+
     /// True if any sample gets a colour.
     pub fn is_shaded(&self) -> bool {
         self.surface.as_ref().is_some_and(|surface| surface.is_shaded) || self.hull.is_some()

@@ -40,8 +40,8 @@ use self::recorder::Recorder;
 use self::residents::{Found, Source};
 use self::schedule::Schedule;
 use self::schedule::sizes::{
-    DeviceTraits, OWNER_BYTES, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, is_painted,
-    occlusion_bytes, samples, work_bytes,
+    DeviceTraits, MIXED_HEAD_BYTES, OWNER_BYTES, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes,
+    has_visibility, is_painted, occlusion_bytes, samples, work_bytes,
 };
 use self::schedule::step::{Band, Goal, Step};
 use self::stage_clock::StageClock;
@@ -222,8 +222,11 @@ impl GpuRenderer {
         let row_bytes = u64::from(plan.width_px) * 4;
         let size = row_bytes * u64::from(plan.height_px);
         let times_at = size.next_multiple_of(8);
+        let counts_at = times_at + StageClock::BYTES;
+        // A number of mixed pixels for each band, and no band is empty.
+        let counts_end = counts_at + if plan.has_mixed() { 4 * u64::from(plan.height_px) } else { 0 };
         self.job(|gpu, buffers| {
-            let staging = buffers.staging(&gpu.handles, times_at + StageClock::BYTES)?.clone();
+            let staging = buffers.staging(&gpu.handles, counts_end)?.clone();
             let device = traits(gpu);
             // Kernels write the bytes to where the CPU reads them, if they can.
             let maps_pictures = gpu.handles.maps_storage && staging.size() <= device.binding_bytes_max;
@@ -241,7 +244,12 @@ impl GpuRenderer {
             if is_timed {
                 recorder.start_clock();
             }
+            let mut counts = 0;
             execute(&mut recorder, plan, &schedule, |recorder, Band { rows: [first, end] }| {
+                if plan.has_mixed() {
+                    recorder.copy_out(Slot::Mixed, 0, 4, counts_at + 4 * counts)?;
+                    counts += 1;
+                }
                 if !maps_pictures {
                     let to = u64::from(first) * row_bytes;
                     recorder.copy_out(Slot::Rgba, 0, u64::from(end - first) * row_bytes, to)?;
@@ -251,9 +259,12 @@ impl GpuRenderer {
                 }
                 recorder.submit()
             })?;
-            let read = if is_timed { times_at + StageClock::BYTES } else { times_at };
+            let read = if is_timed || counts > 0 { counts_at + 4 * counts } else { times_at };
             let mapped = Arc::new(recorder.take_staging(read)?);
-            let times = recorder.times(&mapped.bytes()[times_at as usize..]);
+            let (times, counts) =
+                mapped.bytes()[times_at as usize..].split_at((read.min(counts_at) - times_at) as usize);
+            let mut times = recorder.times(times);
+            times.mixed_pixels = counts.as_chunks().0.iter().map(|count| u64::from(u32::from_le_bytes(*count))).sum();
             Ok((Mapped::pixels(&mapped, 0..size as usize), times))
         })
     }
@@ -383,6 +394,10 @@ fn upload_shading(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedul
     if !is_painted(plan) && (has_visibility(plan) || !plan.lines.is_empty()) {
         buffers.reserve(&gpu.handles, Slot::Colors, band_pixels * color_bytes(plan))?;
     }
+    if plan.has_mixed() {
+        buffers.reserve(&gpu.handles, Slot::Mixed, schedule.banding.mixed_bytes(plan))?;
+        buffers.reserve(&gpu.handles, Slot::Points, schedule.banding.points_bytes(plan))?;
+    }
     if plan.occlusion.is_some() {
         buffers.reserve(&gpu.handles, Slot::Occlusion, occlusion_bytes(plan))?;
     }
@@ -473,6 +488,13 @@ fn execute<'a>(
             }
             Step::EndLayer { layer, end } => {
                 if recorder.read_word(Slot::PeelRounds, layer)? == 0 {
+                    next = end;
+                }
+            }
+            Step::ClearMixed => recorder.clear(Slot::Mixed, MIXED_HEAD_BYTES)?,
+            Step::ClearPoints => recorder.clear(Slot::Points, schedule.banding.points_bytes(plan))?,
+            Step::EndMixed { drawn, end } => {
+                if recorder.read_word(Slot::Mixed, 0)? <= drawn {
                     next = end;
                 }
             }

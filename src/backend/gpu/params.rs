@@ -115,6 +115,8 @@ pub struct Batch {
     pub groups_each: u32,
     pub cleared: u32,
     pub rgba_at: u32,
+    pub slots_first: u32,
+    pub slots_end: u32,
 }
 
 /// Bits of [`Batch::line_flags`].

@@ -15,6 +15,8 @@ pub struct Shown {
     pub faces: bool,
     /// True if something is transparent.
     pub layers: bool,
+    /// True if lines of exact width are drawn.
+    pub lines: bool,
 }
 
 /// Samples in every pixel, and true if mixed pixels are drawn from coverage points besides.
@@ -27,8 +29,8 @@ pub fn samples(scene: &Scene<'_, '_>, shown: Shown, cx: &mut PlanContext<'_>) ->
         "no face is filled"
     } else if shown.layers {
         "something is transparent"
-    } else if scene.spec.backend == BackendChoice::Gpu {
-        "the GPU draws fixed samples alone"
+    } else if shown.lines && scene.spec.backend == BackendChoice::Gpu {
+        "the GPU draws lines over fixed samples alone"
     } else {
         return (samples.per_pixel(), true);
     };

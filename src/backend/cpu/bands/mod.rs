@@ -81,7 +81,7 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
     if plan.peeling().is_some() || plan.is_shaded() {
         lap.end(DrawStage::Shade);
     }
-    if plan.is_adaptive && plan.is_shaded() {
+    if plan.has_mixed() {
         let (width, first) = (plan.width_px as usize, scratch.samples.shown[0]);
         let (samples, colors) = (&scratch.samples, &mut scratch.colors);
         draw_mixed(context, (&bins.triangles, band), samples, &mut scratch.mixed, |x, y, color| {

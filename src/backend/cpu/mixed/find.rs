@@ -29,7 +29,7 @@ pub struct MixedPixels {
 }
 
 /// Places where colours break off from sample to sample, slightly or more.
-mod breaks {
+pub mod breaks {
     /// From the pixel's first sample to its others, one after the other.
     pub const OWN: u8 = 1;
     /// From the first sample of the pixel on the left to this one's.

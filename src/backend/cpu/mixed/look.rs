@@ -15,16 +15,16 @@ const BROKEN: u32 = flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::DEB
 
 /// Largest difference of two values, squared, over their sum, up to which faces look alike: normals that
 /// differ by about 14 degrees, or colours by about 25/255.
-const ALIKE: f32 = 1.0 / 48.0;
+pub const ALIKE: f32 = 1.0 / 48.0;
 
 /// The same up to which they differ slightly: normals by about 50 degrees.
-const SLIGHT: f32 = 1.0 / 4.0;
+pub const SLIGHT: f32 = 1.0 / 4.0;
 
 /// Added to normals, so that all values are above 0.
-const NORMAL_SHIFT: f32 = 1.5;
+pub const NORMAL_SHIFT: f32 = 1.5;
 
 /// The highest bits of a key: what its other bits say.
-mod kinds {
+pub mod kinds {
     /// Index of the material of faces that differ by their normals alone.
     pub const BY_NORMAL: u32 = 1 << 30;
     /// Nothing: triangles of the outline that differ by their colours alone.

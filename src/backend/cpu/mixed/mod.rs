@@ -20,4 +20,4 @@ mod outside_avx2;
 pub(crate) mod points;
 mod recent;
 mod shares;
-mod triangle;
+pub(crate) mod triangle;

@@ -25,13 +25,15 @@ impl<const W: usize> Lattice<W> {
     /// Of so many points of the whole lattice, one is a point of this one.
     pub const STEP: usize = ALL_WORDS / W;
 
+    /// The first of them. The second of four is the one whose counts of half planes are closest to their areas.
+    pub const FIRST: usize = Self::STEP / 4;
+
     /// Column and row of each point in its pixel, 1/256 px, without the half; by word and bit.
     pub const PLACES: [[[i32; WORD]; W]; 2] = {
         let mut places = [[[0; WORD]; W]; 2];
         let mut i = 0;
         while i < Self::POINTS {
-            // The second of four is the one whose counts of half planes are closest to their areas.
-            let whole = Self::STEP * i + Self::STEP / 4;
+            let whole = Self::STEP * i + Self::FIRST;
             places[0][i / WORD][i % WORD] = (whole * GENERATORS[0] % POINTS) as i32;
             places[1][i / WORD][i % WORD] = (whole * GENERATORS[1] % POINTS) as i32;
             i += 1;

@@ -40,6 +40,9 @@ struct Edges {
 /// An edge function in a pixel: its value at the first point, halved, and its change per row and, negative, per column.
 type Edge = [i32; 3];
 
+/// Bound of edge functions in a pixel: what lies beyond has all of it inside, or outside.
+pub const EDGE_MAX: i32 = 1 << 30;
+
 /// The edge function of an edge that has all of a pixel inside.
 const NO_EDGE: Edge = [0; 3];
 
@@ -89,7 +92,7 @@ impl PointTriangle {
         let mut edges = [NO_EDGE; 3];
         for k in 0..3 {
             if first[k] + i64::from(decline[k]) < 0 {
-                edges[k] = [first[k].clamp(-(1 << 30), 1 << 30) as i32, dx[k], dy[k]];
+                edges[k] = [first[k].clamp(-i64::from(EDGE_MAX), EDGE_MAX.into()) as i32, dx[k], dy[k]];
             }
         }
         Some(Outline(edges))

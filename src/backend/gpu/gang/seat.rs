@@ -60,7 +60,7 @@ pub struct Amounts {
 /// True for a plan of a surface alone. Lines, layers and hulls have more to clear, to wait for, or to bring.
 pub fn may_share(plan: &DrawPlan<'_>) -> bool {
     let has_more = !plan.lines.is_empty() || plan.peeling().is_some() || plan.hull.is_some();
-    plan.is_shaded() && !has_more && plan.pass_masks.is_empty()
+    plan.is_shaded() && !has_more && !plan.is_adaptive && plan.pass_masks.is_empty()
 }
 
 impl Share {

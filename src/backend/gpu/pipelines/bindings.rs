@@ -14,6 +14,11 @@ impl Kernel {
             Self::Transform => TRANSFORM,
             Self::Visibility { target: SampleTarget::Visibility, .. } => VISIBILITY,
             Self::Visibility { target: SampleTarget::Layer, .. } => VISIBILITY_OF_LAYER,
+            Self::Visibility { target: SampleTarget::Points, .. } => VISIBILITY_OF_POINTS,
+            Self::VisibilityTile { target: SampleTarget::Points, .. } => TILE_OF_POINTS,
+            Self::Breaks => BREAKS,
+            Self::MixedPixels => MIXED_PIXELS,
+            Self::MixedColor => MIXED_COLOR,
             Self::Clip => CLIP,
             Self::VisibilityTile { target: SampleTarget::Visibility, .. } => TILE,
             Self::VisibilityTile { target: SampleTarget::Layer, .. } => TILE_OF_LAYER,
@@ -32,7 +37,8 @@ impl Kernel {
     }
 
     /// The buffer that is bound at a slot's number. Kernels that find a peeled layer write it where
-    /// others write the visibility buffer, and read that where others read the layer.
+    /// others write the visibility buffer, and read that where others read the layer. Those that find what points see
+    /// write that there, too.
     pub fn bound_at(self, slot: Slot) -> Slot {
         match (self, slot) {
             (
@@ -44,6 +50,11 @@ impl Kernel {
                 Slot::PeelLayer => Slot::Samples,
                 slot => slot,
             },
+            (
+                Self::Visibility { target: SampleTarget::Points, .. }
+                | Self::VisibilityTile { target: SampleTarget::Points, .. },
+                Slot::Samples,
+            ) => Slot::Points,
             _ => slot,
         }
     }
@@ -72,6 +83,16 @@ const VISIBILITY_OF_LAYER: &[Binding] = &[
     (Slot::PeelState, Read),
 ];
 
+const VISIBILITY_OF_POINTS: &[Binding] = &[
+    (Slot::Triangles, Read),
+    (Slot::PassMasks, Read),
+    (Slot::Vertices, Read),
+    (Slot::Samples, ReadWrite),
+    (Slot::Work, ReadWrite),
+    (Slot::PeelRounds, Read),
+    (Slot::Mixed, Read),
+];
+
 const CLIP: &[Binding] = &[
     (Slot::Positions, Read),
     (Slot::Triangles, Read),
@@ -93,6 +114,47 @@ const FEW: &[Binding] = &[
 
 const TILE_OF_LAYER: &[Binding] =
     &[(Slot::Samples, ReadWrite), (Slot::Work, Read), (Slot::PeelLayer, Read), (Slot::PeelState, Read)];
+
+const TILE_OF_POINTS: &[Binding] = &[(Slot::Samples, ReadWrite), (Slot::Work, Read), (Slot::Mixed, Read)];
+
+const BREAKS: &[Binding] = &[
+    (Slot::Positions, Read),
+    (Slot::Triangles, Read),
+    (Slot::Vertices, Read),
+    (Slot::Samples, Read),
+    (Slot::Normals, Read),
+    (Slot::CornerTriangles, Read),
+    (Slot::Attributes, Read),
+    (Slot::Materials, Read),
+    (Slot::FaceNormals, Read),
+    (Slot::HullMaterials, Read),
+    (Slot::Uvs, Read),
+    (Slot::VertexColors, Read),
+    (Slot::Texels, Read),
+    (Slot::Mixed, ReadWrite),
+];
+
+const MIXED_PIXELS: &[Binding] = &[(Slot::Mixed, ReadWrite)];
+
+const MIXED_COLOR: &[Binding] = &[
+    (Slot::Positions, Read),
+    (Slot::Triangles, Read),
+    (Slot::Vertices, Read),
+    (Slot::Samples, Read),
+    (Slot::Normals, Read),
+    (Slot::CornerTriangles, Read),
+    (Slot::Attributes, Read),
+    (Slot::Materials, Read),
+    (Slot::FaceNormals, Read),
+    (Slot::HullMaterials, Read),
+    (Slot::Uvs, Read),
+    (Slot::VertexColors, Read),
+    (Slot::Texels, Read),
+    (Slot::Occlusion, Read),
+    (Slot::Colors, ReadWrite),
+    (Slot::Mixed, Read),
+    (Slot::Points, Read),
+];
 
 const GRID: &[Binding] = &[(Slot::Samples, Read), (Slot::Occlusion, ReadWrite)];
 

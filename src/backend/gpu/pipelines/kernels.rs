@@ -30,6 +30,12 @@ const ENCODE: &str = include_str!("../../../../shaders/encode.wgsl");
 const OVER: &str = include_str!("../../../../shaders/over.wgsl");
 const PLACE: &str = include_str!("../../../../shaders/occlusion/place.wgsl");
 const SPREAD: &str = include_str!("../../../../shaders/occlusion/spread.wgsl");
+const SMALL: &str = include_str!("../../../../shaders/geometry/small.wgsl");
+const TILE_SAMPLES: &str = include_str!("../../../../shaders/geometry/tile_samples.wgsl");
+const MIXED_PLACE: &str = include_str!("../../../../shaders/mixed/place.wgsl");
+const MIXED_LATTICE: &str = include_str!("../../../../shaders/mixed/lattice.wgsl");
+const MIXED_POINTS: &str = include_str!("../../../../shaders/mixed/points.wgsl");
+const HULL: &str = include_str!("../../../../shaders/surface/hull.wgsl");
 const GROUP: &str = include_str!("../../../../shaders/surface/group.wgsl");
 
 /// Shared by shade, composite and line_light: from a point's position to its colour.
@@ -58,6 +64,9 @@ impl Kernel {
             Self::VisibilityFew { .. } => "visibility_few",
             Self::Paint => "paint",
             Self::Shade => "shade",
+            Self::Breaks => "breaks",
+            Self::MixedPixels => "mixed_pixels",
+            Self::MixedColor => "mixed_color",
             Self::Holes => "holes",
             Self::Edge => "edge",
             Self::Coverage => "coverage",
@@ -94,46 +103,64 @@ impl Kernel {
 
     fn own_source(self) -> String {
         let keep_nearest = |write: SampleWrite| if write == SampleWrite::Both { SAMPLES_64 } else { SAMPLES_32 };
-        let emit = |target: SampleTarget| match target {
-            SampleTarget::Visibility => EMIT.to_owned(),
-            SampleTarget::Layer => [PEEL_STATE, EMIT_LAYER].concat(),
+        // Where what is found goes, and what of a triangle is found: first of small ones, then in tiles.
+        let emit = |target: SampleTarget, by_size: &str| match target {
+            SampleTarget::Visibility => [SAMPLES, EMIT, by_size].concat(),
+            SampleTarget::Layer => [SAMPLES, PEEL_STATE, EMIT_LAYER, by_size].concat(),
+            SampleTarget::Points => [MIXED_PLACE, MIXED_LATTICE, MIXED_POINTS].concat(),
         };
         match self {
             Self::Transform => include_str!("../../../../shaders/geometry/transform.wgsl").to_owned(),
             Self::Visibility { write, target } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility.wgsl");
-                [TRIANGLE, CORNERS, WORK, SAMPLES, keep_nearest(write), &emit(target), kernel].concat()
+                [TRIANGLE, CORNERS, WORK, keep_nearest(write), &emit(target, SMALL), kernel].concat()
             }
             Self::Clip => {
                 [TRIANGLE, CORNERS, WORK, PLANES, include_str!("../../../../shaders/geometry/clip.wgsl")].concat()
             }
             Self::VisibilityTile { write, target } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility_tile.wgsl");
-                [TRIANGLE, SAMPLES, keep_nearest(write), &emit(target), TILE, kernel].concat()
+                [TRIANGLE, keep_nearest(write), &emit(target, TILE_SAMPLES), TILE, kernel].concat()
             }
             Self::Grid => [PLACE, include_str!("../../../../shaders/occlusion/grid.wgsl")].concat(),
             Self::Gather => [PLACE, include_str!("../../../../shaders/occlusion/gather.wgsl")].concat(),
             Self::VisibilityFew { write } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility_few.wgsl");
-                [TRIANGLE, CORNERS, SAMPLES, keep_nearest(write), EMIT, TILE, kernel].concat()
+                [TRIANGLE, CORNERS, SAMPLES, keep_nearest(write), EMIT, TILE_SAMPLES, TILE, kernel].concat()
             }
-            Self::Paint => {
-                [&[TRIANGLE], SHADE, &[GROUP, OVER, ENCODE, include_str!("../../../../shaders/surface/paint.wgsl")]]
-                    .concat()
-                    .concat()
-            }
-            Self::Composite => {
-                [&[TRIANGLE], SHADE, &[GROUP, PEEL_STATE, include_str!("../../../../shaders/peeling/composite.wgsl")]]
-                    .concat()
-                    .concat()
-            }
-            Self::Shade => [
+            Self::Paint => [
                 &[TRIANGLE],
                 SHADE,
-                &[GROUP, PEEL_STATE, PLACE, SPREAD, include_str!("../../../../shaders/surface/shade.wgsl")],
+                &[HULL, GROUP, OVER, ENCODE, include_str!("../../../../shaders/surface/paint.wgsl")],
             ]
             .concat()
             .concat(),
+            Self::Composite => [
+                &[TRIANGLE],
+                SHADE,
+                &[HULL, GROUP, PEEL_STATE, include_str!("../../../../shaders/peeling/composite.wgsl")],
+            ]
+            .concat()
+            .concat(),
+            Self::Shade => [
+                &[TRIANGLE],
+                SHADE,
+                &[HULL, GROUP, PEEL_STATE, PLACE, SPREAD, include_str!("../../../../shaders/surface/shade.wgsl")],
+            ]
+            .concat()
+            .concat(),
+            Self::Breaks => {
+                let (look, kernel) = (
+                    include_str!("../../../../shaders/mixed/look.wgsl"),
+                    include_str!("../../../../shaders/mixed/breaks.wgsl"),
+                );
+                [&[TRIANGLE], SHADE, &[HULL, MIXED_PLACE, look, kernel]].concat().concat()
+            }
+            Self::MixedPixels => [MIXED_PLACE, include_str!("../../../../shaders/mixed/mixed_pixels.wgsl")].concat(),
+            Self::MixedColor => {
+                let kernel = include_str!("../../../../shaders/mixed/mixed_color.wgsl");
+                [&[TRIANGLE], SHADE, &[HULL, PLACE, SPREAD, MIXED_PLACE, MIXED_LATTICE, kernel]].concat().concat()
+            }
             Self::LineLight => {
                 [&[TRIANGLE], SHADE, &[include_str!("../../../../shaders/lines/line_light.wgsl")]].concat().concat()
             }
@@ -175,6 +202,11 @@ impl Kernel {
                 key::SAMPLES | key::PASS_MASKS | key::PEELING | key::BEHIND_SURFACE
             }
             Self::VisibilityTile { target: SampleTarget::Visibility, .. } => key::SAMPLES | key::GANG,
+            Self::Visibility { target: SampleTarget::Points, .. } => key::PASS_MASKS,
+            Self::VisibilityTile { target: SampleTarget::Points, .. } => 0,
+            Self::Breaks => SHADED,
+            Self::MixedPixels => 0,
+            Self::MixedColor => SHADED | key::OCCLUSION,
             Self::VisibilityFew { .. } => key::SAMPLES | key::PASS_MASKS | key::GANG,
             Self::Paint => SHADED | key::GANG,
             Self::VisibilityTile { target: SampleTarget::Layer, .. } => key::SAMPLES | key::BEHIND_SURFACE,

@@ -44,6 +44,12 @@ pub enum Kernel {
     Composite,
     /// Samples to colours.
     Shade,
+    /// Samples to the places where colours break off.
+    Breaks,
+    /// Those places to mixed pixels.
+    MixedPixels,
+    /// What the points of mixed pixels see to colours.
+    MixedColor,
     /// Samples to bytes, where nothing else is to be drawn.
     Paint,
     /// Faces to the area that their lines leave free.
@@ -76,6 +82,8 @@ pub enum SampleTarget {
     Visibility,
     /// A peeled layer.
     Layer,
+    /// The points of mixed pixels.
+    Points,
 }
 
 /// Buffers by their binding number in group 1 of every shader.
@@ -103,7 +111,9 @@ pub enum Slot {
     VertexColors,
     Texels,
     Progress,
-    PassMasks = 24,
+    Mixed,
+    Points,
+    PassMasks,
     HullMaterials,
     PeelLayer,
     PeelState,
@@ -212,6 +222,9 @@ impl Kernel {
     pub fn stage(self) -> DrawStage {
         match self {
             Self::Transform => DrawStage::Transform,
+            Self::Visibility { target: SampleTarget::Points, .. }
+            | Self::VisibilityTile { target: SampleTarget::Points, .. } => DrawStage::Mixed,
+            Self::Breaks | Self::MixedPixels | Self::MixedColor => DrawStage::Mixed,
             Self::Visibility { .. } | Self::Clip | Self::VisibilityTile { .. } | Self::VisibilityFew { .. } => {
                 DrawStage::Visibility
             }

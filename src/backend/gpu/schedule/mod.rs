@@ -289,8 +289,39 @@ impl Schedule {
         if plan.is_shaded() {
             self.dispatch(device, Kernel::Shade, count, pixels)?;
         }
+        if plan.has_mixed() {
+            self.mixed(plan, device, pixels)?;
+        }
         self.lines(plan, device, pixels, edge_starts)?;
         self.dispatch(device, Kernel::Resolve, count, pixels)
+    }
+
+    /// The mixed pixels of a band: as many at a time as have room.
+    fn mixed(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, pixels: Batch) -> Result<(), DrawError> {
+        let around = (plan.width_px + 2) * (pixels.row_first.abs_diff(pixels.row_end) + 2);
+        self.steps.push(Step::ClearMixed);
+        self.dispatch(device, Kernel::Breaks, around, Batch { count: around, ..pixels })?;
+        self.dispatch(device, Kernel::MixedPixels, pixels.count, pixels)?;
+        let slots = self.banding.slots(plan);
+        let mut ends = Vec::new();
+        for first in (0..pixels.count).step_by(slots as usize) {
+            if first > 0 {
+                ends.push(self.steps.len());
+                self.steps.push(Step::EndMixed { drawn: first, end: 0 });
+            }
+            let some = Batch { slots_first: first, slots_end: first + slots, ..pixels };
+            self.steps.push(Step::ClearPoints);
+            self.triangles(device, some, SampleTarget::Points, Pass::of_visibility(plan))?;
+            self.dispatch(device, Kernel::MixedColor, slots, Batch { count: slots, ..some })?;
+            self.steps.push(Step::Submit);
+        }
+        let last = self.steps.len();
+        for at in ends {
+            if let Some(Step::EndMixed { end, .. }) = self.steps.get_mut(at) {
+                *end = last;
+            }
+        }
+        Ok(())
     }
 
     pub(crate) fn dispatch(

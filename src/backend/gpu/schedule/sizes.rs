@@ -2,6 +2,7 @@
 
 use super::step::Goal;
 use crate::backend::DrawError;
+use crate::backend::sample_partition::POINTS;
 use crate::plan::DrawPlan;
 
 /// Largest buffer that holds a band of the picture, bytes.
@@ -32,6 +33,12 @@ pub const STROKES_BYTES: u64 = 52;
 
 /// Bytes per pixel of lit lines: the face that lights them.
 pub const OWNER_BYTES: u64 = 4;
+
+/// Bytes of a band's mixed pixels before what there is per pixel: their number.
+pub const MIXED_HEAD_BYTES: u64 = 16;
+
+/// Mixed pixels whose points are in memory at a time, at most: 64 MiB.
+const SLOTS_MAX: u32 = 1 << 15;
 
 /// Bytes of a pixel of the picture.
 const RGBA_BYTES: u64 = 4;
@@ -80,7 +87,7 @@ impl Banding {
         if goal != Goal::Picture {
             return Self::with_margin(plan, device, [0, 0]);
         }
-        let margin = plan.line_margin_rows();
+        let margin = plan.margin_rows();
         Self::with_margin(plan, device, [margin, plan.margin_px])
             .or_else(|_| Self::with_margin(plan, device, [margin, 0]))
     }
@@ -124,7 +131,28 @@ impl Banding {
         let layers = if plan.peeling().is_some() { PEEL_STATE_BYTES + SAMPLE_BYTES } else { 0 };
         let (strokes, owners) = if plan.lines.is_empty() { (0, 0) } else { (STROKES_BYTES, OWNER_BYTES) };
         let pixel = u64::from(plan.samples) * layers + color_bytes(plan) + strokes + owners + RGBA_BYTES;
+        let seen = seen + self.mixed_bytes(plan) + self.points_bytes(plan);
         seen + u64::from(plan.width_px) * u64::from(self.rows) * pixel
+    }
+}
+
+impl Banding {
+    /// Mixed pixels whose points are in memory at a time.
+    pub fn slots(&self, plan: &DrawPlan<'_>) -> u32 {
+        SLOTS_MAX.min(plan.width_px * self.rows)
+    }
+
+    /// Bytes of what is known of a band's mixed pixels.
+    pub fn mixed_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
+        let [width, rows] = [plan.width_px, self.rows].map(u64::from);
+        let words = 2 * width * rows + (width + 2) * (rows + 2);
+        if plan.has_mixed() { MIXED_HEAD_BYTES + 4 * words } else { 0 }
+    }
+
+    /// Bytes of what the points of some of them see.
+    pub fn points_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
+        let slot = POINTS as u64 * SAMPLE_BYTES;
+        if plan.has_mixed() { u64::from(self.slots(plan)) * slot } else { 0 }
     }
 }
 
@@ -160,7 +188,8 @@ pub fn has_visibility(plan: &DrawPlan<'_>) -> bool {
 
 /// True if one kernel makes the picture of the visibility buffer: nothing is drawn over the surface.
 pub fn is_painted(plan: &DrawPlan<'_>) -> bool {
-    plan.is_shaded() && plan.lines.is_empty() && plan.peeling().is_none() && plan.occlusion.is_none()
+    let has_more = !plan.lines.is_empty() || plan.peeling().is_some() || plan.occlusion.is_some();
+    plan.is_shaded() && !has_more && !plan.has_mixed()
 }
 
 /// Samples of so many rows.
@@ -218,7 +247,7 @@ mod tests {
                 assert!(banding.rows >= 1 && banding.rows <= plan.height_px);
                 // The margin is complete unless one band is the whole picture.
                 let is_all = banding.rows == plan.height_px && banding.beyond == 0;
-                assert!(banding.margin == plan.line_margin_rows() || is_all, "{case:?}");
+                assert!(banding.margin == plan.margin_rows() || is_all, "{case:?}");
                 if banding.beyond < case.beyond {
                     without += 1;
                     assert!(case.samples > 8 && case.width_px > 80.0 && device.binding_bytes_max < 256 << 20);

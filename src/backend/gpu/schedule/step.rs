@@ -22,6 +22,17 @@ pub enum Step {
         /// Index of the step after the last layer.
         end: usize,
     },
+    /// Clears the number of mixed pixels.
+    ClearMixed,
+    /// Clears what the points of mixed pixels see.
+    ClearPoints,
+    /// Reads how many mixed pixels there are and, if there are no more than so many, continues at step `end`.
+    EndMixed {
+        /// Mixed pixels that are drawn.
+        drawn: u32,
+        /// Index of the step after the last of them.
+        end: usize,
+    },
     /// Runs a kernel over `threads` threads with the batch at `batch`.
     Dispatch {
         /// Its index.

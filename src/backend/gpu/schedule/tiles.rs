@@ -2,6 +2,7 @@
 
 use super::PIECES_MAX;
 use super::sizes::{ALONE_SIZE, Banding, DeviceTraits};
+use crate::backend::sample_partition::POINTS;
 use crate::plan::DrawPlan;
 
 /// Sample tests that may be handed to the device without looking at how many it really is: a second
@@ -54,12 +55,13 @@ impl Tiles {
         let pixels = u64::from(seen[0]) * u64::from(seen[1].max(plan.height_px));
         let hull = plan.hull.as_ref().map_or(0, |hull| hull.triangles.len());
         let triangles = (plan.triangles.len() + hull) as u64;
-        let tests = triangles.saturating_mul(pixels * u64::from(plan.samples));
+        let tests_each = if plan.has_mixed() { POINTS as u64 / 4 } else { u64::from(plan.samples) };
+        let tests = triangles.saturating_mul(pixels * tests_each);
         let mut tiles = Self {
             in_rounds: false,
             workgroups: device.tile_workgroups.min(device.workgroups_max),
-            // 64 blocks, in each the samples; and as much again for the way there.
-            tile_iterations: 64 * (u64::from(plan.samples) + 1) + 64,
+            // 64 blocks, in each the samples, or the points four at a time; and as much again for the way there.
+            tile_iterations: 64 * (tests_each + 1) + 64,
             band_tiles: u64::from(seen[0] / TILE_PX + 2) * u64::from(seen[1] / TILE_PX + 2),
             shares_few: device.alone_size_of_few < ALONE_SIZE,
         };

@@ -3,10 +3,12 @@
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::{CpuRenderer, Isa};
+use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::plan::DrawPlan;
 
+use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
 use crate::support::scenes::{self, SCENES};
 use crate::support::shapes::{self, Random};
@@ -68,6 +70,28 @@ fn pixels_of_many_faces_have_the_same_bytes_too() {
         }
     }
     assert!(smallest > 30 && largest > 600, "{smallest} to {largest} mixed pixels");
+}
+
+/// Both back-ends find the same mixed pixels, and draw them alike. With 64-bit atomics and without.
+#[test]
+fn both_back_ends_draw_the_same_mixed_pixels() {
+    let Some(gpus) = gpus() else { return };
+    let mut cpu = CpuRenderer::new(2);
+    let mut renderers = gpus.each_ref().map(|gpu| GpuRenderer::new(gpu.clone()));
+    let mut compared = 0;
+    each_plan(|name, plan| {
+        if !plan.lines.is_empty() {
+            return;
+        }
+        let want = draw(&mut cpu, plan);
+        for renderer in &mut renderers {
+            let found = draw(renderer, plan);
+            assert_eq!(renderer.draw_times().mixed_pixels, cpu.draw_times().mixed_pixels, "{name}");
+            Likeness::of(&found, &want).assert(Tolerance::TWINS, name);
+            compared += 1;
+        }
+    });
+    assert!(compared > 24, "{compared}");
 }
 
 /// Pixels that are not mixed have the bytes of 4 samples, and many pixels are not mixed.
@@ -138,7 +162,10 @@ fn owns(corners: &Corners, p: [i64; 2]) -> bool {
 fn mixed_pixels_count_their_points() {
     const SIZE_PX: [u32; 2] = [48, 40];
     let mut random = Random(7);
-    let mut renderers = [CpuRenderer::new(1), CpuRenderer::plain(1)];
+    let mut renderers: Vec<Box<dyn Renderer>> = vec![Box::new(CpuRenderer::new(1)), Box::new(CpuRenderer::plain(1))];
+    renderers
+        .extend(gpus().into_iter().flatten().map(|gpu| Box::new(GpuRenderer::new(gpu.clone())) as Box<dyn Renderer>));
+    let renderers_count = renderers.len();
     let (mut partial, mut whole) = (0, 0);
     for size_px in [0.4, 3.0, 20.0, 400.0] {
         let (mut positions, mut triangles, mut snapped) = (Vec::new(), Vec::new(), Vec::<Corners>::new());
@@ -156,7 +183,7 @@ fn mixed_pixels_count_their_points() {
         let mut plan = scenes::screen_plan(SIZE_PX, 4, 1.0, &positions, &triangles);
         (plan.is_adaptive, plan.margin_px, plan.background) = (true, 8, [0.0; 4]);
         for renderer in &mut renderers {
-            let image = draw(renderer, &plan);
+            let image = draw(renderer.as_mut(), &plan);
             for (x, y) in (0..SIZE_PX[1]).flat_map(|y| (0..SIZE_PX[0]).map(move |x| (x, y))) {
                 let place = |i: i64| [2 * (256 * i64::from(x) + i) + 1, 2 * (256 * i64::from(y) + i * 181 % 256) + 1];
                 let count = (0..256).filter(|&i| snapped.iter().any(|corners| owns(corners, place(i)))).count();
@@ -171,8 +198,8 @@ fn mixed_pixels_count_their_points() {
             }
         }
     }
-    assert!(partial > 900, "{partial}");
-    let pixels = 2 * 4 * (SIZE_PX[0] * SIZE_PX[1]) as usize;
+    assert!(partial > 450 * renderers_count, "{partial}");
+    let pixels = renderers_count * 4 * (SIZE_PX[0] * SIZE_PX[1]) as usize;
     assert!(whole + partial > pixels * 99 / 100, "{whole} and {partial} of {pixels}");
 }
 
@@ -210,7 +237,7 @@ fn pictures_that_cannot_have_them_say_so() {
     assert_eq!((warning.code, warning.detail.as_str()), ("samples_fixed", said));
     let glass = scenes::plan(&mesh, &scenes::spec(&[("samples", "adaptive"), ("surface.opacity", "0.5")]));
     assert!(glass.warnings[0].detail.contains("something is transparent"), "{:?}", glass.warnings);
-    let gpu = scenes::plan(&mesh, &scenes::spec(&[("samples", "adaptive"), ("style", "flat"), ("backend", "gpu")]));
+    let gpu = scenes::plan(&mesh, &scenes::spec(&[("samples", "adaptive"), ("style", "wire"), ("backend", "gpu")]));
     assert_eq!((gpu.samples, gpu.is_adaptive), (16, false));
-    assert!(gpu.warnings[0].detail.contains("the GPU draws fixed samples alone"), "{:?}", gpu.warnings);
+    assert!(gpu.warnings[0].detail.contains("the GPU draws lines over fixed samples alone"), "{:?}", gpu.warnings);
 }

@@ -1,0 +1,16 @@
+// Stage visibility, per pixel of a tile: the samples that a triangle covers, and its depth at each.
+
+fn draw_pixel(s: Setup, e: Edges, values: vec3<i32>, in_block: vec2<i32>, pixel: vec2<i32>, id: u32) {
+    let corner = sample_corner(pixel);
+    for (var n = 0; n < sample_count(); n++) {
+        let offset = sample_step(n);
+        let at = 16 * in_block + offset;
+        let value = values + e.dx * at.y - e.dy * at.x;
+        if (value.x | value.y | value.z) >= 0 {
+            let z = depth_at(s, corner + 16 * offset);
+            if z > 0.0 {
+                emit(pixel, n, z, id);
+            }
+        }
+    }
+}

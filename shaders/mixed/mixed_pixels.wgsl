@@ -1,0 +1,37 @@
+// Stage mixed, per pixel: whether it is mixed, and its number among those that are. Twin of MixedPixels::join in
+// src/backend/cpu/mixed/find.rs. Numbers are in no order; nothing depends on it.
+
+@group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
+
+// Places where colours break off, slightly or more, that concern the pixel itself, the one on its right, and the one
+// below it.
+const OWN_PLACES: u32 = 0x11u;
+const LEFT_PLACES: u32 = 0x33u;
+const UPPER_PLACES: u32 = 0x55u;
+const HARD_PLACES: u32 = 0x70u;
+
+@compute @workgroup_size(WORKGROUP)
+fn mixed_pixels(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
+    if i >= batch.count {
+        return;
+    }
+    let pixel = vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width);
+    let found = breaks_in(pixel)
+        | (breaks_in(pixel - vec2(1, 0)) & OWN_PLACES)
+        | (breaks_in(pixel + vec2(1, 0)) & LEFT_PLACES)
+        | (breaks_in(pixel - vec2(0, 1)) & OWN_PLACES)
+        | (breaks_in(pixel + vec2(0, 1)) & UPPER_PLACES);
+    if found == 0u {
+        atomicStore(&mixed[number_at(i)], 0u);
+        return;
+    }
+    let few = select(FEW, 0u, (found & HARD_PLACES) != 0u);
+    let number = atomicAdd(&mixed[0], 1u);
+    atomicStore(&mixed[number_at(i)], (number + 1u) | few);
+    atomicStore(&mixed[pixel_at(number)], i | few);
+}
+
+fn breaks_in(pixel: vec2<i32>) -> u32 {
+    return atomicLoad(&mixed[breaks_at(pixel)]);
+}
