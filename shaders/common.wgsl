@@ -188,6 +188,8 @@ const WIRE_LIT: u32 = 0x10000000u;
 const DEBUG: u32 = 0x20000000u;
 // Colours vary over a triangle.
 const VARYING: u32 = 0x40000000u;
+// Some pixels are mixed.
+const ADAPTIVE: u32 = 0x80000000u;
 
 // Bits of the above. A constant of the pipeline, so that a kernel contains only the code that its
 // plan needs.

@@ -14,6 +14,8 @@
 @group(1) @binding(12) var<storage, read_write> strokes: array<u32>;
 // Per pass.
 @group(1) @binding(17) var<storage, read> line_colors: array<vec4<f32>>;
+// The band's mixed pixels, as place.wgsl lays them out.
+@group(1) @binding(22) var<storage, read> mixed: array<u32>;
 // Per sample, the points assigned to it, as stroke.wgsl numbers them.
 @group(1) @binding(29) var<storage, read> sample_masks: array<u32>;
 
@@ -144,6 +146,15 @@ fn weight(i: u32, points: u32, opacity: f32) -> f32 {
     }
     let count = u32(sample_count());
     let at = STROKE_WORDS * i;
+    if has(ADAPTIVE) {
+        let number = mixed[number_at(i)];
+        if number != 0u {
+            let seen = seen_points(border_at((number & ~FEW) - 1u), at);
+            if seen.x != 0u {
+                return ratio(f32(seen.x), f32(seen.y), points, opacity);
+            }
+        }
+    }
     // In points.
     var surface = 0.0;
     var surface_covered = 0.0;
@@ -159,6 +170,21 @@ fn weight(i: u32, points: u32, opacity: f32) -> f32 {
             surface_covered += rn(alpha * f32(covered));
         }
     }
+    return ratio(surface, surface_covered, points, opacity);
+}
+
+// The points of a mixed pixel that see something, and those of them that lines cover.
+fn seen_points(border: u32, at: u32) -> vec2<u32> {
+    var seen = vec2(0u);
+    for (var w = 0u; w < MASK_WORDS; w++) {
+        let word = mixed[border + w];
+        seen += vec2(countOneBits(word), countOneBits(word & mask_word(at, w)));
+    }
+    return seen;
+}
+
+// The ratio, given how many points the surface has, how many of these lines cover, and how many they cover in all.
+fn ratio(surface: f32, surface_covered: f32, points: u32, opacity: f32) -> f32 {
     if surface < ALPHA_MIN || surface == f32(POINTS) {
         return 1.0;
     }

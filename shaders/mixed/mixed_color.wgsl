@@ -3,7 +3,7 @@
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
-@group(1) @binding(22) var<storage, read> mixed: array<u32>;
+@group(1) @binding(22) var<storage, read_write> mixed: array<u32>;
 // What the points see, in words like those of samples.
 @group(1) @binding(23) var<storage, read> points: array<vec2<u32>>;
 
@@ -48,6 +48,28 @@ fn mixed_color(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workg
         sum += rn4(weight * share_color(~word.x, pixel, mean, vec2(bitcast<f32>(word.y), own_z)));
     }
     colors[at] = sum;
+    if has(LINES) {
+        write_border(number, !is_few);
+    }
+}
+
+// Writes the points that see something, for lines over the pixel; none if they are all, or if the pixel has few.
+fn write_border(number: u32, has_all: bool) {
+    var unseen = 0u;
+    for (var w = 0u; w < 8u; w++) {
+        unseen |= ~done[w];
+    }
+    let is_border = has_all && unseen != 0u;
+    for (var w = 0u; w < BORDER_WORDS; w++) {
+        var word = 0u;
+        if is_border {
+            for (var bit = 0u; bit < 32u; bit++) {
+                let p = 16u * (bit % 16u) + 2u * w + bit / 16u;
+                word |= ((done[p / 32u] >> (p % 32u)) & 1u) << bit;
+            }
+        }
+        mixed[border_at(number) + w] = word;
+    }
 }
 
 // The colour of a triangle at a point of a pixel, given its depth and that of the pixel's first sample.

@@ -63,8 +63,6 @@ impl Backends {
         deadline: &Deadline,
     ) -> Result<Chosen, DrawError> {
         match choice {
-            // Only the CPU draws lines over mixed pixels.
-            _ if plan.is_adaptive && !plan.lines.is_empty() => self.draw_on_cpu(plan, sink, deadline),
             BackendChoice::Cpu => self.draw_on_cpu(plan, sink, deadline),
             BackendChoice::Gpu => self.draw_on_gpu(GpuKind::Any, plan, deadline),
             BackendChoice::Auto if self.has_gpu() && self.host.costs().prefers_cpu(PlanSize::of(plan)) => {

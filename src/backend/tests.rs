@@ -47,7 +47,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     // Pipeline key.
     add_same!("", key: SURFACE HULL FACE_NORMALS VERTEX_NORMALS WIRES TRIANGLE_MATERIALS EDGE_MASKS LINES CLIPPED
         EIGHT_SAMPLES SIXTEEN_SAMPLES FOUR_SAMPLES LIT_LINES CONTOURS HOLED PASS_MASKS OCCLUSION HULL_MATERIALS PEELING BEHIND_SURFACE
-        WIRES_ONLY PEELED_HULL DERIVATIVE_NORMALS VERTEX_COLORS UVS TEXTURES WIRE_MINIMUM WIRE_LIT DEBUG VARYING);
+        WIRES_ONLY PEELED_HULL DERIVATIVE_NORMALS VERTEX_COLORS UVS TEXTURES WIRE_MINIMUM WIRE_LIT DEBUG VARYING ADAPTIVE);
     // Line flags, pass masks, faces.
     add_same!("", line_flags: SHOWN_VISIBLE SHOWN_HIDDEN SKIP_BACK CONTOUR LIT_PASS FIRST_PASS INSIDE_OUT HOLES
         RIM_PASS);
@@ -104,7 +104,12 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
         "TEXTURE_NONE" = TEXTURE_NONE,
         "TEXTURE_SLOTS" = slots::COUNT
     );
-    add!("HEAD_WORDS" = MIXED_HEAD_BYTES / 4, "PLACE_MAX" = points::PLACE_MAX, "FEW_STEP" = points::Lattice::<1>::STEP);
+    add!(
+        "HEAD_WORDS" = MIXED_HEAD_BYTES / 4,
+        "BORDER_WORDS" = POINTS / 32,
+        "PLACE_MAX" = points::PLACE_MAX,
+        "FEW_STEP" = points::Lattice::<1>::STEP
+    );
     add!("FEW_FIRST" = points::Lattice::<1>::FIRST, "EDGE_MAX" = triangle::EDGE_MAX);
     let of_all_levels = |places: u8| places | places << breaks::HARD;
     add!(

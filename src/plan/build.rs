@@ -50,7 +50,7 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
     let hides = surface.is_some() || groups.has_hull();
     let is_peeled = needed_pass(groups).is_some();
     let has_faces = groups.has_hull() || surface.as_ref().is_some_and(|surface| surface.is_shaded);
-    let shown = surface::adaptive::Shown { faces: has_faces, layers: is_peeled, lines: !lines.is_empty() };
+    let shown = surface::adaptive::Shown { faces: has_faces, layers: is_peeled };
     let (samples, is_adaptive) = surface::adaptive::samples(scene, shown, &mut cx);
     let needed_px = lines.iter().map(lines::LinePass::margin_rows).filter(|_| hides).max();
     let needed_px = needed_px.unwrap_or(0).max(u32::from(is_adaptive));

@@ -2,7 +2,7 @@
 
 use crate::plan::context::PlanContext;
 use crate::scene::Scene;
-use crate::spec::{BackendChoice, Samples};
+use crate::spec::Samples;
 use crate::warning::Warning;
 
 /// Samples per pixel of pictures that ask for adaptive ones and cannot have them.
@@ -15,8 +15,6 @@ pub struct Shown {
     pub faces: bool,
     /// True if something is transparent.
     pub layers: bool,
-    /// True if lines of exact width are drawn.
-    pub lines: bool,
 }
 
 /// Samples in every pixel, and true if mixed pixels are drawn from coverage points besides.
@@ -29,8 +27,6 @@ pub fn samples(scene: &Scene<'_, '_>, shown: Shown, cx: &mut PlanContext<'_>) ->
         "no face is filled"
     } else if shown.layers {
         "something is transparent"
-    } else if shown.lines && scene.spec.backend == BackendChoice::Gpu {
-        "the GPU draws lines over fixed samples alone"
     } else {
         return (samples.per_pixel(), true);
     };

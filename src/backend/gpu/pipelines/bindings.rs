@@ -152,7 +152,7 @@ const MIXED_COLOR: &[Binding] = &[
     (Slot::Texels, Read),
     (Slot::Occlusion, Read),
     (Slot::Colors, ReadWrite),
-    (Slot::Mixed, Read),
+    (Slot::Mixed, ReadWrite),
     (Slot::Points, Read),
 ];
 
@@ -246,6 +246,7 @@ const COVERAGE: &[Binding] = &[
     (Slot::LineColors, Read),
     (Slot::PeelState, Read),
     (Slot::SampleMasks, Read),
+    (Slot::Mixed, Read),
 ];
 
 const LINE_LIGHT: &[Binding] = &[

@@ -174,7 +174,7 @@ impl Kernel {
             }
             Self::Coverage => {
                 let kernel = include_str!("../../../../shaders/lines/coverage.wgsl");
-                [OVER, STROKE_WORDS, SEEN, INSET, LATTICE, FREE_POINTS, PEEL_STATE, kernel].concat()
+                [OVER, STROKE_WORDS, SEEN, INSET, LATTICE, FREE_POINTS, PEEL_STATE, MIXED_PLACE, kernel].concat()
             }
             Self::Resolve => [OVER, ENCODE, include_str!("../../../../shaders/resolve.wgsl")].concat(),
         }
@@ -206,7 +206,7 @@ impl Kernel {
             Self::VisibilityTile { target: SampleTarget::Points, .. } => 0,
             Self::Breaks => SHADED,
             Self::MixedPixels => 0,
-            Self::MixedColor => SHADED | key::OCCLUSION,
+            Self::MixedColor => SHADED | key::OCCLUSION | key::LINES,
             Self::VisibilityFew { .. } => key::SAMPLES | key::PASS_MASKS | key::GANG,
             Self::Paint => SHADED | key::GANG,
             Self::VisibilityTile { target: SampleTarget::Layer, .. } => key::SAMPLES | key::BEHIND_SURFACE,
@@ -214,7 +214,7 @@ impl Kernel {
             Self::Grid | Self::Gather => key::SAMPLES | key::GANG,
             Self::Shade => SHADED | key::PEELING | key::OCCLUSION | key::GANG,
             Self::LineLight => SHADED,
-            Self::Coverage => key::HOLED | key::SURFACE | key::HULL | key::PEELING | key::SAMPLES,
+            Self::Coverage => key::HOLED | key::SURFACE | key::HULL | key::PEELING | key::SAMPLES | key::ADAPTIVE,
             Self::Holes => key::SAMPLES,
             Self::Edge => key::HOLED | key::CONTOURS | key::CLIPPED | key::SAMPLES,
             Self::Resolve => key::SURFACE | key::HULL | key::LINES | key::GANG,

@@ -69,6 +69,8 @@ pub const WIRE_LIT: u32 = 0x1000_0000;
 pub const DEBUG: u32 = 0x2000_0000;
 /// Colours vary over a triangle.
 pub const VARYING: u32 = 0x4000_0000;
+/// Some pixels are mixed.
+pub const ADAPTIVE: u32 = 0x8000_0000;
 
 /// The key of a plan.
 pub fn pipeline_key(plan: &DrawPlan<'_>) -> u32 {
@@ -91,7 +93,7 @@ pub fn pipeline_key(plan: &DrawPlan<'_>) -> u32 {
     if let Some(layers) = plan.peeling() {
         key |= PEELING | when(layers.behind_surface, BEHIND_SURFACE) | when(layers.wires_only, WIRES_ONLY);
     }
-    key |= when(plan.occlusion.is_some(), OCCLUSION);
+    key |= when(plan.occlusion.is_some(), OCCLUSION) | when(plan.has_mixed(), ADAPTIVE);
     key | when(!plan.lines.is_empty(), LINES)
         | when(plan.lines.iter().any(|lines| lines.contour), CONTOURS)
         | when(plan.lights_lines(), LIT_LINES)

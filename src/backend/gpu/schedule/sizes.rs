@@ -145,7 +145,8 @@ impl Banding {
     /// Bytes of what is known of a band's mixed pixels.
     pub fn mixed_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
         let [width, rows] = [plan.width_px, self.rows].map(u64::from);
-        let words = 2 * width * rows + (width + 2) * (rows + 2);
+        let border = if plan.lines.is_empty() { 0 } else { POINTS as u64 / 32 };
+        let words = (2 + border) * width * rows + (width + 2) * (rows + 2);
         if plan.has_mixed() { MIXED_HEAD_BYTES + 4 * words } else { 0 }
     }
 

@@ -133,7 +133,6 @@ fn plan_of<'a>(mesh: &'a meshsnap::mesh::Mesh, (name, _, style, light): &Case) -
 fn whole_pictures_are_near_the_truth() {
     let (mut missed, mut all) = (Vec::new(), [Errors::default(); 2]);
     let mut renderers = renderers();
-    renderers.truncate(1);
     for case in CASES {
         let mesh = scenes::mesh(&(case.1)());
         let plan = plan_of(&mesh, case);
