@@ -5,14 +5,20 @@
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
 @group(1) @binding(22) var<storage, read_write> mixed: array<u32>;
 // What the points see, in words like those of samples.
-@group(1) @binding(23) var<storage, read> points: array<vec2<u32>>;
+@group(1) @binding(23) var<storage, read_write> points: array<vec2<u32>>;
 
-// Points whose colour is in the sum, a bit each.
-var<private> done: array<u32, 8>;
+// Of the pixel that a workgroup colours: what each point sees, as in `points`, and the share that each triangle adds to the
+// colour, where the first of its points is.
+var<workgroup> seen: array<vec2<u32>, POINTS>;
+var<workgroup> parts: array<vec4<f32>, POINTS>;
 
 @compute @workgroup_size(WORKGROUP)
-fn mixed_color(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = gid.x + gid.y * groups.x * WORKGROUP;
+fn mixed_color(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    let i = workgroup.x + workgroup.y * groups.x;
     let number = batch.slots_first + i;
     if i >= batch.count || number >= mixed[0] {
         return;
@@ -22,54 +28,68 @@ fn mixed_color(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workg
     let pixel = vec2(i32(at) % frame.width, batch.row_first + i32(at) / frame.width);
     let own_z = bitcast<f32>(samples[first_visibility_sample(at)].y);
     let is_few = (entry & FEW) != 0u;
+    for (var p = thread; p < POINTS; p += WORKGROUP) {
+        seen[p] = points[i * POINTS + p];
+        // For the next pixel that has the place.
+        points[i * POINTS + p] = vec2(0u);
+    }
+    workgroupBarrier();
     let step = select(1u, FEW_STEP, is_few);
-    let base = i * POINTS;
-    for (var w = 0u; w < 8u; w++) {
-        done[w] = 0u;
-    }
-    var sum = vec4(0.0);
-    for (var p = select(0u, FEW_FIRST, is_few); p < POINTS; p += step) {
-        let word = points[base + p];
-        if word.y == 0u || ((done[p / 32u] >> (p % 32u)) & 1u) != 0u {
-            continue;
+    for (var p = select(thread, FEW_FIRST + FEW_STEP * thread, is_few); p < POINTS; p += step * WORKGROUP) {
+        parts[p] = vec4(0.0);
+        if seen[p].y != 0u && is_first(p, step) {
+            parts[p] = part_of(p, step, pixel, own_z);
         }
-        var count = 0;
-        var places = vec2(0);
-        for (var q = p; q < POINTS; q += step) {
-            let other = points[base + q];
-            if other.y != 0u && other.x == word.x {
-                done[q / 32u] |= 1u << (q % 32u);
-                count++;
-                places += 2 * point_place(q) + 1;
-            }
-        }
-        let weight = f32(count) / f32(POINTS / step);
-        let mean = rn2(vec2<f32>(places) * recip(f32(2 * count)));
-        sum += rn4(weight * share_color(~word.x, pixel, mean, vec2(bitcast<f32>(word.y), own_z)));
     }
-    colors[at] = sum;
-    if has(LINES) {
-        write_border(number, !is_few);
+    workgroupBarrier();
+    if thread == 0u {
+        var sum = vec4(0.0);
+        for (var p = select(0u, FEW_FIRST, is_few); p < POINTS; p += step) {
+            sum += parts[p];
+        }
+        colors[at] = sum;
+    }
+    if has(LINES) && thread < BORDER_WORDS {
+        mixed[border_at(number) + thread] = select(border_word(thread), 0u, is_few);
     }
 }
 
-// Writes the points that see something, for lines over the pixel; none if they are all, or if the pixel has few.
-fn write_border(number: u32, has_all: bool) {
-    var unseen = 0u;
-    for (var w = 0u; w < 8u; w++) {
-        unseen |= ~done[w];
-    }
-    let is_border = has_all && unseen != 0u;
-    for (var w = 0u; w < BORDER_WORDS; w++) {
-        var word = 0u;
-        if is_border {
-            for (var bit = 0u; bit < 32u; bit++) {
-                let p = 16u * (bit % 16u) + 2u * w + bit / 16u;
-                word |= ((done[p / 32u] >> (p % 32u)) & 1u) << bit;
-            }
+// True if no point before p sees its triangle.
+fn is_first(p: u32, step: u32) -> bool {
+    for (var q = p % step; q < p; q += step) {
+        if seen[q].x == seen[p].x && seen[q].y != 0u {
+            return false;
         }
-        mixed[border_at(number) + w] = word;
     }
+    return true;
+}
+
+// What a triangle adds to the colour, given the first of its points.
+fn part_of(p: u32, step: u32, pixel: vec2<i32>, own_z: f32) -> vec4<f32> {
+    var count = 0;
+    var places = vec2(0);
+    for (var q = p; q < POINTS; q += step) {
+        if seen[q].x == seen[p].x && seen[q].y != 0u {
+            count++;
+            places += 2 * point_place(q) + 1;
+        }
+    }
+    let weight = f32(count) / f32(POINTS / step);
+    let mean = rn2(vec2<f32>(places) * recip(f32(2 * count)));
+    return rn4(weight * share_color(~seen[p].x, pixel, mean, vec2(bitcast<f32>(seen[p].y), own_z)));
+}
+
+// A word of the points that see something, for lines over the pixel; none if all do.
+fn border_word(w: u32) -> u32 {
+    var is_border = false;
+    for (var p = 0u; p < POINTS; p++) {
+        is_border |= seen[p].y == 0u;
+    }
+    var word = 0u;
+    for (var bit = 0u; is_border && bit < 32u; bit++) {
+        word |= select(0u, 1u, seen[16u * (bit % 16u) + 2u * w + bit / 16u].y != 0u) << bit;
+    }
+    return word;
 }
 
 // The colour of a triangle at a point of a pixel, given its depth and that of the pixel's first sample.

@@ -3,6 +3,7 @@
 //!
 //!     cargo bench --bench gpu                              # bumpy tori of 70 k and 1 M triangles, 512 px
 //!     cargo bench --bench gpu -- --mesh bunny.obj --look flat --size 256 --workers 16 --rounds 200
+//!     cargo bench --bench gpu -- --samples adaptive
 //!     cargo bench --bench gpu -- --copy yes                # with a copy of each picture, as if none were read in place
 
 // A tool for developers: giving up loudly is fine.
@@ -33,6 +34,7 @@ const LOOKS: [&str; 4] = ["flat", "auto", "wire", "outline"];
 fn main() {
     let (mut file, mut size, mut workers, mut rounds, mut copies) = (None, "512".to_owned(), 1, 60_usize, false);
     let mut looks = LOOKS.map(str::to_owned).to_vec();
+    let mut samples = "4".to_owned();
     let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
     while let Some(name) = arguments.next() {
         let value = arguments.next().unwrap_or_else(|| panic!("{name} needs a value"));
@@ -41,6 +43,7 @@ fn main() {
             "--size" => size = value,
             "--workers" => workers = value.parse().expect("a number"),
             "--look" => looks = vec![value],
+            "--samples" => samples = value,
             "--copy" => copies = value == "yes",
             "--rounds" => rounds = value.parse().expect("a number"),
             other => panic!("there is no option {other}"),
@@ -59,7 +62,7 @@ fn main() {
     for file in files {
         let mesh = read(&file);
         for look in &looks {
-            measure(&gpu, (&file.name, &mesh), (look, &size), (workers, rounds.max(1)), copies);
+            measure(&gpu, (&file.name, &mesh), (look, &size, &samples), (workers, rounds.max(1)), copies);
         }
     }
 }
@@ -78,14 +81,14 @@ fn read(file: &MeshFile) -> Mesh {
 fn measure(
     gpu: &Arc<Gpu>,
     (name, mesh): (&str, &Mesh),
-    (look, size): (&str, &str),
+    (look, size, samples): (&str, &str, &str),
     (workers, rounds): (usize, usize),
     copies: bool,
 ) {
     let limits = Limits { memory_bytes: 16 << 30, ..Limits::default() };
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
-    let keys =
-        [("style", look), ("size", size), ("view", "iso")].map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let keys = [("style", look), ("size", size), ("view", "iso"), ("samples", samples)];
+    let keys = keys.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let spec = request::read(None, &keys, &Rules { limits: limits.clone(), backend: BackendChoice::Gpu }).unwrap();
     let scene = Scene::new(mesh, &spec, &mut budget).unwrap();
     let prepared = Prepared::default();
@@ -115,9 +118,10 @@ fn measure(
     let (least, times) = drawn.first().expect("a worker");
     let parts: Vec<String> =
         times.parts().map(|(stage, took)| format!("{} {:.3}", stage.name(), took.as_secs_f64() * 1e3)).collect();
+    let mixed = if times.mixed_pixels > 0 { format!("; {} mixed pixels", times.mixed_pixels) } else { String::new() };
     let device: f64 = times.parts().map(|(_, took)| took.as_secs_f64() * 1e3).sum();
     println!(
-        "{name}, {look}: first {first:.0} ms, least {least:.2} ms, {rate:.0}/s; device {device:.3} ms: {}",
+        "{name}, {look}, samples {samples}: first {first:.0} ms, least {least:.2} ms, {rate:.0}/s; device {device:.3} ms: {}{mixed}",
         parts.join(", ")
     );
 }

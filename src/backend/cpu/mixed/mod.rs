@@ -5,7 +5,6 @@
 //! each may show, of those of the band ([`band_triangles`]). [`points`] has the points of a pixel, [`triangle`] says which of
 //! them a triangle covers, [`faces`] and [`crowd`] which face each sees, [`shares`] and [`color`] what colour that makes.
 //! [`draw`] runs them for a band.
-//! Only the CPU has this stage.
 
 pub(crate) mod band_triangles;
 mod color;

@@ -153,7 +153,7 @@ const MIXED_COLOR: &[Binding] = &[
     (Slot::Occlusion, Read),
     (Slot::Colors, ReadWrite),
     (Slot::Mixed, ReadWrite),
-    (Slot::Points, Read),
+    (Slot::Points, ReadWrite),
 ];
 
 const GRID: &[Binding] = &[(Slot::Samples, Read), (Slot::Occlusion, ReadWrite)];

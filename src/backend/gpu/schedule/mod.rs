@@ -36,6 +36,10 @@ pub const PIECES_MAX: u32 = 6;
 /// and do not add to it.
 const BATCHES_MAX: usize = 1 << 19;
 
+/// Rounds of mixed pixels that are handed to real devices without looking at how many there are: looking takes longer than
+/// a few rounds of none.
+const ROUNDS_BLIND: u32 = 8;
+
 /// Samples that a thread of the transform stage empties, at most.
 const CLEARED_BY_THREAD: u32 = 4;
 
@@ -299,21 +303,24 @@ impl Schedule {
     /// The mixed pixels of a band: as many at a time as have room.
     fn mixed(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, pixels: Batch) -> Result<(), DrawError> {
         let around = (plan.width_px + 2) * (pixels.row_first.abs_diff(pixels.row_end) + 2);
-        self.steps.push(Step::ClearMixed);
+        // The kernel of colours leaves points as it found them: clear.
+        self.steps.extend([Step::ClearMixed, Step::ClearPoints]);
         self.dispatch(device, Kernel::Breaks, around, Batch { count: around, ..pixels })?;
         self.dispatch(device, Kernel::MixedPixels, pixels.count, pixels)?;
         let slots = self.banding.slots(plan);
+        let blind = if device.loops_are_limited { 1 } else { ROUNDS_BLIND };
         let mut ends = Vec::new();
         for first in (0..pixels.count).step_by(slots as usize) {
-            if first > 0 {
+            if first > 0 && (first / slots).is_multiple_of(blind) {
                 ends.push(self.steps.len());
                 self.steps.push(Step::EndMixed { drawn: first, end: 0 });
             }
             let some = Batch { slots_first: first, slots_end: first + slots, ..pixels };
-            self.steps.push(Step::ClearPoints);
             self.triangles(device, some, SampleTarget::Points, Pass::of_visibility(plan))?;
-            self.dispatch(device, Kernel::MixedColor, slots, Batch { count: slots, ..some })?;
-            self.steps.push(Step::Submit);
+            self.dispatch_groups(device, Kernel::MixedColor, slots, Batch { count: slots, ..some })?;
+            if plan.triangles.len() > CHUNK as usize {
+                self.steps.push(Step::Submit);
+            }
         }
         let last = self.steps.len();
         for at in ends {
