@@ -1,5 +1,10 @@
 // Stage visibility, per small triangle: the samples that it covers, and its depth at each.
 
+// True if triangles are drawn at all.
+fn is_any_wanted() -> bool {
+    return true;
+}
+
 fn draw_small(s: Setup, bounds: vec4<i32>, id: u32) {
     let e = edges_of(s);
     let corner = sample_corner(bounds.xy);

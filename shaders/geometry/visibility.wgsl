@@ -7,7 +7,7 @@
 fn visibility(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     begin_job(gid.z);
     let i = gid.x + gid.y * groups.x * WORKGROUP;
-    if i >= batch.count || is_peeling_done() {
+    if i >= batch.count || is_peeling_done() || !is_any_wanted() {
         return;
     }
     let t = batch.first + i;

@@ -18,11 +18,17 @@ fn mixed_color(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    let i = workgroup.x + workgroup.y * groups.x;
-    let number = batch.slots_first + i;
-    if i >= batch.count || number >= mixed[0] {
-        return;
+    let count = min(batch.count, max(mixed[0], batch.slots_first) - batch.slots_first);
+    for (var i = workgroup.x; i < count; i += groups.x) {
+        color_pixel(i, thread);
+        // Another pixel must not be read before all threads are done with this one.
+        workgroupBarrier();
     }
+}
+
+// Colours the pixel whose points are the i-th.
+fn color_pixel(i: u32, thread: u32) {
+    let number = batch.slots_first + i;
     let entry = mixed[pixel_at(number)];
     let at = entry & ~FEW;
     let pixel = vec2(i32(at) % frame.width, batch.row_first + i32(at) / frame.width);

@@ -9,6 +9,11 @@ const PLACE_MAX: i32 = 255;
 // Bound of edge functions in a pixel: what lies beyond has all of it inside, or outside.
 const EDGE_MAX: i32 = 0x40000000;
 
+// True if there are mixed pixels of these numbers.
+fn is_any_wanted() -> bool {
+    return batch.slots_first < mixed[0];
+}
+
 fn draw_small(s: Setup, bounds: vec4<i32>, id: u32) {
     let e = edges_of(s);
     for (var y = bounds.y; y <= bounds.w; y++) {

@@ -396,6 +396,8 @@ fn upload_shading(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedul
     }
     if plan.has_mixed() {
         buffers.reserve(&gpu.handles, Slot::Mixed, schedule.banding.mixed_bytes(plan))?;
+        // A new buffer is empty, and the kernel of colours leaves it empty, whenever a job ends well. Others do not give
+        // their buffers back.
         buffers.reserve(&gpu.handles, Slot::Points, schedule.banding.points_bytes(plan))?;
     }
     if plan.occlusion.is_some() {
@@ -492,7 +494,6 @@ fn execute<'a>(
                 }
             }
             Step::ClearMixed => recorder.clear(Slot::Mixed, MIXED_HEAD_BYTES)?,
-            Step::ClearPoints => recorder.clear(Slot::Points, schedule.banding.points_bytes(plan))?,
             Step::EndMixed { drawn, end } => {
                 if recorder.read_word(Slot::Mixed, 0)? <= drawn {
                     next = end;

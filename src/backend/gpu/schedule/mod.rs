@@ -40,6 +40,9 @@ const BATCHES_MAX: usize = 1 << 19;
 /// a few rounds of none.
 const ROUNDS_BLIND: u32 = 8;
 
+/// Mixed pixels that a workgroup colours, one after the other, at most.
+const PIXELS_EACH: u32 = 16;
+
 /// Samples that a thread of the transform stage empties, at most.
 const CLEARED_BY_THREAD: u32 = 4;
 
@@ -303,8 +306,7 @@ impl Schedule {
     /// The mixed pixels of a band: as many at a time as have room.
     fn mixed(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, pixels: Batch) -> Result<(), DrawError> {
         let around = (plan.width_px + 2) * (pixels.row_first.abs_diff(pixels.row_end) + 2);
-        // The kernel of colours leaves points as it found them: clear.
-        self.steps.extend([Step::ClearMixed, Step::ClearPoints]);
+        self.steps.push(Step::ClearMixed);
         self.dispatch(device, Kernel::Breaks, around, Batch { count: around, ..pixels })?;
         self.dispatch(device, Kernel::MixedPixels, pixels.count, pixels)?;
         let slots = self.banding.slots(plan);
@@ -317,7 +319,8 @@ impl Schedule {
             }
             let some = Batch { slots_first: first, slots_end: first + slots, ..pixels };
             self.triangles(device, some, SampleTarget::Points, Pass::of_visibility(plan))?;
-            self.dispatch_groups(device, Kernel::MixedColor, slots, Batch { count: slots, ..some })?;
+            let workgroups = slots.div_ceil(PIXELS_EACH).min(device.workgroups_max);
+            self.dispatch_groups(device, Kernel::MixedColor, workgroups, Batch { count: slots, ..some })?;
             if plan.triangles.len() > CHUNK as usize {
                 self.steps.push(Step::Submit);
             }
