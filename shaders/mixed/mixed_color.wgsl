@@ -7,8 +7,9 @@
 // What the points see, in words like those of samples.
 @group(1) @binding(23) var<storage, read_write> points: array<vec2<u32>>;
 
-// Of the pixel that a workgroup colours: what each point sees, as in `points`, and the share that each triangle adds to the
-// colour, where the first of its points is.
+// Pixels of the round. Of the one that the workgroup colours: what each point sees, as in `points`, and what each triangle
+// adds to the colour, where the first of its points is.
+var<workgroup> pixel_count: u32;
 var<workgroup> seen: array<vec2<u32>, POINTS>;
 var<workgroup> parts: array<vec4<f32>, POINTS>;
 
@@ -18,7 +19,10 @@ fn mixed_color(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    let count = min(batch.count, max(mixed[0], batch.slots_first) - batch.slots_first);
+    if thread == 0u {
+        pixel_count = min(batch.count, max(mixed[0], batch.slots_first) - batch.slots_first);
+    }
+    let count = workgroupUniformLoad(&pixel_count);
     for (var i = workgroup.x; i < count; i += groups.x) {
         color_pixel(i, thread);
         // Another pixel must not be read before all threads are done with this one.

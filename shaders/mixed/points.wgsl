@@ -51,7 +51,7 @@ fn draw_points(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
         }
         return;
     }
-    // Four at a time: the loops of a thread may not have many rounds (src/backend/gpu/schedule/tiles.rs).
+    // Four at a time: a thread may run few iterations only (src/backend/gpu/schedule/tiles.rs).
     for (var i = 0u; i < POINTS; i += 4u) {
         draw_point(s, e, c, start, i, first, id);
         draw_point(s, e, c, start, i + 1u, first, id);

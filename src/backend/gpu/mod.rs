@@ -396,8 +396,8 @@ fn upload_shading(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedul
     }
     if plan.has_mixed() {
         buffers.reserve(&gpu.handles, Slot::Mixed, schedule.banding.mixed_bytes(plan))?;
-        // A new buffer is empty, and the kernel of colours leaves it empty, whenever a job ends well. Others do not give
-        // their buffers back.
+        // It is all zeros when a job begins: mixed_color.wgsl clears what it reads, a new buffer is clear, and a job that
+        // fails does not give its buffers back.
         buffers.reserve(&gpu.handles, Slot::Points, schedule.banding.points_bytes(plan))?;
     }
     if plan.occlusion.is_some() {
@@ -494,6 +494,7 @@ fn execute<'a>(
                 }
             }
             Step::ClearMixed => recorder.clear(Slot::Mixed, MIXED_HEAD_BYTES)?,
+            Step::ClearPoints => recorder.clear(Slot::Points, schedule.banding.points_bytes(plan))?,
             Step::EndMixed { drawn, end } => {
                 if recorder.read_word(Slot::Mixed, 0)? <= drawn {
                     next = end;
@@ -504,8 +505,8 @@ fn execute<'a>(
             Step::Lines { batch, workgroups } => {
                 recorder.lines_in_rounds(batch, workgroups, schedule.progress_bytes)?;
             }
-            Step::Tiles { kernel, batch } if schedule.tiles.in_rounds => {
-                recorder.tiles_in_rounds(kernel, &schedule.batches[batch], &schedule.tiles)?;
+            Step::Tiles { kernel, batch } if schedule.tiles_of(kernel).in_rounds => {
+                recorder.tiles_in_rounds(kernel, &schedule.batches[batch], schedule.tiles_of(kernel))?;
             }
             Step::Tiles { kernel, batch } => recorder.dispatch(kernel, batch, [schedule.tiles.workgroups, 1])?,
             Step::Submit => recorder.submit()?,

@@ -89,9 +89,25 @@ impl TriangleBin {
         })
     }
 
+    /// Number of clipped pieces, in all bands.
+    pub fn piece_count(&self) -> u32 {
+        self.pieces.len() as u32
+    }
+
+    /// Numbers of the band's clipped pieces.
+    pub fn piece_numbers_in(&self, band: usize) -> impl Iterator<Item = u32> {
+        self.piece_bands.items_in(band)
+    }
+
+    /// The id and the corners of clipped piece number `i`.
+    pub fn piece(&self, i: u32) -> (u32, &[ScreenVertex; 3]) {
+        let (id, piece) = &self.pieces[i as usize];
+        (*id, piece)
+    }
+
     /// The band's clipped pieces with their ids.
     pub fn pieces_in(&self, band: usize) -> impl Iterator<Item = (u32, &[ScreenVertex; 3])> {
-        self.piece_bands.items_in(band).map(|i| &self.pieces[i as usize]).map(|(id, piece)| (*id, piece))
+        self.piece_numbers_in(band).map(|i| self.piece(i))
     }
 }
 

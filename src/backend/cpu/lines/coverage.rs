@@ -140,7 +140,7 @@ fn to_f32(v: u64) -> f32 {
     (v >> 32) as f32 * 4_294_967_296.0 + (v as u32) as f32
 }
 
-/// The points that see something in mixed pixels of which others see nothing.
+/// Points that see a face, of mixed pixels in which other points see nothing.
 #[derive(Default)]
 pub struct BorderPoints {
     /// Per pixel, 1 more than its index in `masks`; 0 for all others. Empty where no line asks.
@@ -195,7 +195,7 @@ pub struct LineCompositor<'a> {
     /// The points assigned to each sample; empty where there is no surface under the lines.
     sample_masks: Vec<Mask>,
     /// The points that see the surface in mixed pixels at its border.
-    border: &'a BorderPoints,
+    border: Option<&'a BorderPoints>,
 }
 
 /// Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent
@@ -211,8 +211,9 @@ impl<'a> LineCompositor<'a> {
         border: &'a BorderPoints,
     ) -> Self {
         let samples = if plan.is_shaded() && !plan.lines.is_empty() { plan.samples } else { 0 };
-        // The scratch may still hold the layers of another plan.
+        // The scratch may still hold what belongs to another plan.
         let peel = peel.filter(|_| plan.peeling().is_some());
+        let border = Some(border).filter(|_| plan.has_mixed());
         let sample_masks = (0..samples).map(|s| points_of_sample(samples, s)).collect();
         Self { plan, band, peel, sample_masks, border }
     }
@@ -239,7 +240,7 @@ impl<'a> LineCompositor<'a> {
             let over = self.peel.map_or(0.0, |peel| peel.alpha(x, y, s as u32));
             if self.band.pixel(x as i32, y as i32).0[s] == NOTHING { over } else { 1.0 }
         };
-        let weight = match self.border.of(pixel) {
+        let weight = match self.border.and_then(|border| border.of(pixel)) {
             Some(seen) => weight_of_points(seen, mask, opacity),
             None => weight(&self.sample_masks, shown, mask, opacity),
         };

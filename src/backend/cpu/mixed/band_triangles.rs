@@ -1,6 +1,5 @@
 //! Stage mixed, per band: the triangles that its pixels are offered, in the order in which they are.
 
-use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use crate::backend::cpu::RasterContext;
@@ -10,13 +9,13 @@ use crate::backend::cpu::geometry::transform::ScreenVertex;
 /// The triangles of a band.
 pub struct BandTriangles<'a> {
     context: &'a RasterContext<'a>,
-    /// Ids and corners of clipped pieces.
-    pieces: Vec<(u32, &'a [ScreenVertex; 3])>,
-    /// All items: pieces, then what faces the viewer, then the rest, which is mostly hidden by then.
-    items: Vec<Cow<'a, [u32]>>,
+    bins: &'a [TriangleBin],
+    band: usize,
+    /// By bin: the number of clipped pieces in those before it.
+    pieces_before: Vec<u32>,
 }
 
-/// Highest bit of a [`ScreenTriangle::item`]: the others are the index of a piece. Ids are smaller.
+/// Highest bit of a [`ScreenTriangle::item`]: the others are the number of a piece. Ids are smaller.
 const PIECE: u32 = 1 << 31;
 
 /// A triangle, or a piece of one, on screen.
@@ -24,32 +23,49 @@ const PIECE: u32 = 1 << 31;
 pub struct ScreenTriangle {
     /// The triangle.
     pub id: u32,
-    /// Its number among those of the band, for [`BandTriangles::get`].
+    /// Its number among those of the picture, for [`BandTriangles::get`].
     pub item: u32,
     /// Its corners.
     pub corners: [ScreenVertex; 3],
 }
 
+/// The kinds of a bin's triangles, in the order in which they are offered: what faces away is mostly hidden by then.
+#[derive(Clone, Copy)]
+enum Kind {
+    Pieces,
+    Fronts,
+    Backs,
+}
+
 impl<'a> BandTriangles<'a> {
     /// The triangles of band number `band`.
     pub fn new(context: &'a RasterContext<'a>, (bins, band): (&'a [TriangleBin], usize)) -> Self {
-        let pieces: Vec<_> = bins.iter().flat_map(|bin| bin.pieces_in(band)).collect();
-        let mut items = vec![Cow::Owned((0..pieces.len() as u32).map(|i| PIECE | i).collect())];
-        for is_front in [true, false] {
-            for bin in bins {
-                let (listed, others) = if is_front { &bin.fronts } else { &bin.backs }.items_in(band);
-                items.extend([Cow::Borrowed(listed), Cow::Owned(others)]);
-            }
-        }
-        Self { context, pieces, items }
+        let mut count = 0;
+        let count_before = |bin: &TriangleBin| {
+            count += bin.piece_count();
+            count - bin.piece_count()
+        };
+        Self { context, bins, band, pieces_before: bins.iter().map(count_before).collect() }
     }
 
     /// Calls `each` for each triangle until it breaks off.
     #[inline(always)]
     pub fn for_each(&self, mut each: impl FnMut(ScreenTriangle) -> ControlFlow<()>) -> ControlFlow<()> {
-        for items in &self.items {
-            for &item in items.iter() {
-                each(self.get(item))?;
+        for kind in [Kind::Pieces, Kind::Fronts, Kind::Backs] {
+            for (bin, before) in self.bins.iter().zip(&self.pieces_before) {
+                // One place that calls `each`, so that it is inlined.
+                let (listed, others) = match kind {
+                    Kind::Pieces => {
+                        (&[][..], bin.piece_numbers_in(self.band).map(|piece| PIECE | (before + piece)).collect())
+                    }
+                    Kind::Fronts => bin.fronts.items_in(self.band),
+                    Kind::Backs => bin.backs.items_in(self.band),
+                };
+                for ids in [listed, &others] {
+                    for &item in ids {
+                        each(self.get(item))?;
+                    }
+                }
             }
         }
         ControlFlow::Continue(())
@@ -58,9 +74,17 @@ impl<'a> BandTriangles<'a> {
     /// The triangle of an [`item`](ScreenTriangle::item).
     #[inline(always)]
     pub fn get(&self, item: u32) -> ScreenTriangle {
-        match self.pieces.get((item ^ PIECE) as usize) {
-            Some((id, corners)) => ScreenTriangle { id: *id, item, corners: **corners },
-            None => ScreenTriangle { id: item, item, corners: self.context.screen_triangle(item) },
+        if item & PIECE == 0 {
+            return ScreenTriangle { id: item, item, corners: self.context.screen_triangle(item) };
         }
+        self.get_piece(item)
+    }
+
+    #[inline(never)]
+    fn get_piece(&self, item: u32) -> ScreenTriangle {
+        let number = item ^ PIECE;
+        let bin = self.pieces_before.partition_point(|before| *before <= number).saturating_sub(1);
+        let (id, corners) = self.bins[bin].piece(number - self.pieces_before[bin]);
+        ScreenTriangle { id, item, corners: *corners }
     }
 }

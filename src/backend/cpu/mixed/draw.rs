@@ -83,5 +83,7 @@ pub fn draw_mixed(
             }
         }
         first = end;
+        // The pixels after a crowded one need not be crowded.
+        at_once = (2 * at_once).min(PIXELS_MAX);
     }
 }

@@ -1,5 +1,5 @@
 //! Stage mixed, per pixel, of plans with adaptive samples: pixels near which faces meet that differ in
-//! colour are drawn again, from 256 coverage points each.
+//! colour are drawn again, from 64 or 256 coverage points each.
 //!
 //! [`look`] says what decides the colour of a face, [`find`] which pixels are mixed. [`lists`] has the triangles that
 //! each may show, of those of the band ([`band_triangles`]). [`points`] has the points of a pixel, [`triangle`] says which of

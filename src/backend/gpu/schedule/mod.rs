@@ -17,6 +17,7 @@ use super::params::{Batch, edge_lists, faces_code};
 use crate::backend::DrawError;
 use crate::backend::gpu::pass_mask::Pass;
 use crate::backend::gpu::pipelines::{Kernel, SampleTarget, SampleWrite};
+use crate::backend::sample_partition::POINTS;
 use crate::plan::{DrawPlan, pass_mask};
 
 /// Triangles per dispatch, where none needs clipping; each may leave one item in the work list.
@@ -33,14 +34,16 @@ pub const PIECES_MAX: u32 = 6;
 /// surface and 16 layers, filled and hull, in two phases: 17 * 77 * 2 * 2 = 5236. A pass of 30
 /// million edges that may be long is 229 chunks and three more for its coverage; 48 such passes are
 /// 11,136. That makes 0.52 million; a job with more is refused. Margin rows are no bands of their own
-/// and do not add to it.
+/// and do not add to it. Mixed pixels, which exclude layers, take less: 512 rounds of 77 chunks, filled and hull, in two
+/// phases are 158,000.
 const BATCHES_MAX: usize = 1 << 19;
 
-/// Rounds of mixed pixels that are handed to real devices without looking at how many there are: looking takes longer than
-/// a few rounds of none.
-const ROUNDS_BLIND: u32 = 8;
+/// Rounds of mixed pixels that are queued on a real device before their number is read back. Waiting for it takes longer
+/// than a few empty rounds.
+const ROUNDS_QUEUED: u32 = 8;
 
-/// Mixed pixels that a workgroup colours, one after the other, at most.
+/// Mixed pixels that a workgroup of a real device colours, one after the other. On software it colours one: a thread may
+/// run 1,600 iterations for a pixel of 256 triangles, and thousands more to shade its share of them.
 const PIXELS_EACH: u32 = 16;
 
 /// Samples that a thread of the transform stage empties, at most.
@@ -60,8 +63,10 @@ pub struct Schedule {
     pub work_items: u32,
     /// Layers that are looked for in each band.
     pub layers: u32,
-    /// Runs of the tile kernel.
+    /// Runs of the tile kernel, for samples.
     pub tiles: Tiles,
+    /// The same for the points of mixed pixels.
+    pub tiles_of_points: Tiles,
     /// Bytes for the state of paused workgroups of the edge kernel.
     pub progress_bytes: u64,
     /// The result.
@@ -74,7 +79,8 @@ impl Schedule {
     /// The commands that compute `goal` for `plan`.
     pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Result<Self, DrawError> {
         let banding = Banding::new(plan, device, goal)?;
-        let tiles = Tiles::new(plan, device, banding);
+        let tiles = Tiles::new(plan, device, banding, u64::from(plan.samples));
+        let tiles_of_points = Tiles::new(plan, device, banding, POINTS as u64 / 4);
         let edge_starts = edge_lists(&plan.lines).1;
         let (steps, batches) = (Vec::new(), Vec::new());
         let mut schedule = Self {
@@ -84,6 +90,7 @@ impl Schedule {
             work_items: 0,
             layers: 0,
             tiles,
+            tiles_of_points,
             progress_bytes: 0,
             goal,
             is_work_empty: true,
@@ -164,6 +171,14 @@ impl Schedule {
         }
         let count = plan.width_px * plan.height_px;
         self.dispatch(device, Kernel::Gather, count, Batch { count, ..Batch::default() })
+    }
+
+    /// The runs of a tile kernel.
+    pub fn tiles_of(&self, kernel: Kernel) -> &Tiles {
+        match kernel {
+            Kernel::VisibilityTile { target: SampleTarget::Points, .. } => &self.tiles_of_points,
+            _ => &self.tiles,
+        }
     }
 
     /// The kernels of all steps.
@@ -307,19 +322,23 @@ impl Schedule {
     fn mixed(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, pixels: Batch) -> Result<(), DrawError> {
         let around = (plan.width_px + 2) * (pixels.row_first.abs_diff(pixels.row_end) + 2);
         self.steps.push(Step::ClearMixed);
+        // Kernels leave all points clear, unless a software device ends their loops.
+        if device.loops_are_limited {
+            self.steps.push(Step::ClearPoints);
+        }
         self.dispatch(device, Kernel::Breaks, around, Batch { count: around, ..pixels })?;
         self.dispatch(device, Kernel::MixedPixels, pixels.count, pixels)?;
         let slots = self.banding.slots(plan);
-        let blind = if device.loops_are_limited { 1 } else { ROUNDS_BLIND };
+        let (queued, pixels_each) = if device.loops_are_limited { (1, 1) } else { (ROUNDS_QUEUED, PIXELS_EACH) };
         let mut ends = Vec::new();
         for first in (0..pixels.count).step_by(slots as usize) {
-            if first > 0 && (first / slots).is_multiple_of(blind) {
+            if first > 0 && (first / slots).is_multiple_of(queued) {
                 ends.push(self.steps.len());
                 self.steps.push(Step::EndMixed { drawn: first, end: 0 });
             }
             let some = Batch { slots_first: first, slots_end: first + slots, ..pixels };
             self.triangles(device, some, SampleTarget::Points, Pass::of_visibility(plan))?;
-            let workgroups = slots.div_ceil(PIXELS_EACH).min(device.workgroups_max);
+            let workgroups = slots.div_ceil(pixels_each);
             self.dispatch_groups(device, Kernel::MixedColor, workgroups, Batch { count: slots, ..some })?;
             if plan.triangles.len() > CHUNK as usize {
                 self.steps.push(Step::Submit);

@@ -34,7 +34,7 @@ pub const STROKES_BYTES: u64 = 52;
 /// Bytes per pixel of lit lines: the face that lights them.
 pub const OWNER_BYTES: u64 = 4;
 
-/// Bytes of a band's mixed pixels before what there is per pixel: their number.
+/// Bytes at the start of the buffer of mixed pixels, which hold their number.
 pub const MIXED_HEAD_BYTES: u64 = 16;
 
 /// Mixed pixels whose points are in memory at a time, at most: 64 MiB.
@@ -104,7 +104,7 @@ impl Banding {
         }
         let room = seen.saturating_sub(2 * u64::from(margin));
         if room == 0 {
-            let why = "the device has no room for what lines so wide key at in a picture so wide";
+            let why = "the device has no room for what lines so wide look at in a picture so wide";
             return Err(DrawError::BeyondGpu(why.to_owned()));
         }
         Ok(Self { rows: rows.min(room) as u32, margin, beyond })
@@ -245,6 +245,8 @@ mod tests {
                 };
                 assert!(banding.bytes(plan) <= ALL_BYTES_MAX, "{}: {banding:?} {case:?}", banding.bytes(plan));
                 assert!(banding.seen_samples(plan) * SAMPLE_BYTES <= device.binding_bytes_max);
+                assert!(banding.mixed_bytes(plan) <= device.binding_bytes_max, "{case:?}");
+                assert!(banding.points_bytes(plan) <= device.binding_bytes_max, "{case:?}");
                 assert!(banding.rows >= 1 && banding.rows <= plan.height_px);
                 // The margin is complete unless one band is the whole picture.
                 let is_all = banding.rows == plan.height_px && banding.beyond == 0;

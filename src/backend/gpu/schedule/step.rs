@@ -24,6 +24,8 @@ pub enum Step {
     },
     /// Clears the number of mixed pixels.
     ClearMixed,
+    /// Clears what the points of mixed pixels see.
+    ClearPoints,
     /// Reads how many mixed pixels there are and, if there are no more than so many, continues at step `end`.
     EndMixed {
         /// Mixed pixels that are drawn.

@@ -2,7 +2,6 @@
 
 use super::PIECES_MAX;
 use super::sizes::{ALONE_SIZE, Banding, DeviceTraits};
-use crate::backend::sample_partition::POINTS;
 use crate::plan::DrawPlan;
 
 /// Sample tests that may be handed to the device without looking at how many it really is: a second
@@ -49,18 +48,17 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// For the bands of a plan.
-    pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, banding: Banding) -> Self {
+    /// For the bands of a plan, and so many iterations of a thread's loop per pixel: one for each sample, or for four points.
+    pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, banding: Banding, tests_each: u64) -> Self {
         let seen = [banding.seen_columns(plan), banding.seen_rows(plan)];
         let pixels = u64::from(seen[0]) * u64::from(seen[1].max(plan.height_px));
         let hull = plan.hull.as_ref().map_or(0, |hull| hull.triangles.len());
         let triangles = (plan.triangles.len() + hull) as u64;
-        let tests_each = if plan.has_mixed() { POINTS as u64 / 4 } else { u64::from(plan.samples) };
         let tests = triangles.saturating_mul(pixels * tests_each);
         let mut tiles = Self {
             in_rounds: false,
             workgroups: device.tile_workgroups.min(device.workgroups_max),
-            // 64 blocks, in each the samples, or the points four at a time; and as much again for the way there.
+            // 64 blocks, in each the samples or points; and as much again for the way there.
             tile_iterations: 64 * (tests_each + 1) + 64,
             band_tiles: u64::from(seen[0] / TILE_PX + 2) * u64::from(seen[1] / TILE_PX + 2),
             shares_few: device.alone_size_of_few < ALONE_SIZE,
@@ -142,7 +140,7 @@ mod tests {
             let mut plan = plan(&triangles, case);
             plan.hull = None;
             let banding = Banding { rows: 256, margin: 0, beyond: 0 };
-            let tiles = Tiles::new(&plan, &software, banding);
+            let tiles = Tiles::new(&plan, &software, banding, u64::from(plan.samples));
             let all = PIECES_MAX * triangles.len() as u32;
             let rounds = tiles.rounds(all, all);
             assert_eq!(tiles.in_rounds, rounds.len() > 2, "{} triangles: {rounds:?}", triangles.len());

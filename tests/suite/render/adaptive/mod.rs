@@ -72,6 +72,50 @@ fn pixels_of_many_faces_have_the_same_bytes_too() {
     assert!(smallest > 30 && largest > 600, "{smallest} to {largest} mixed pixels");
 }
 
+/// What a picture leaves in buffers is not seen in the next one.
+#[test]
+fn fixed_samples_after_adaptive_ones_are_as_if_alone() {
+    let mesh = scenes::mesh(&shapes::torus(24));
+    let keys = [("style", "wire"), ("samples", "adaptive"), ("size", "200"), ("wire.thickness", "0.6")];
+    let mut plan = scenes::plan(&mesh, &scenes::spec(&keys));
+    let mut renderer = CpuRenderer::new(2);
+    let adaptive = draw(&mut renderer, &plan);
+    plan.is_adaptive = false;
+    let want = draw(&mut CpuRenderer::new(2), &plan);
+    assert!(draw(&mut renderer, &plan) == want);
+    assert!(adaptive != want);
+}
+
+/// Several rounds of points, and several bands of a picture.
+#[test]
+fn large_pictures_are_drawn_in_rounds_and_bands() {
+    let Some(gpus) = gpus() else { return };
+    let mesh = scenes::mesh(&shapes::torus(50));
+    let keys = [("style", "flat"), ("samples", "adaptive"), ("size", "2000x1200"), ("camera.margin", "0")];
+    // All borders between faces are mixed.
+    let keys = [&keys[..], &[("surface.debug", "face-orientation")]].concat();
+    let plan = scenes::plan(&mesh, &scenes::spec(&keys));
+    let (mut cpu, mut gpu) = (CpuRenderer::new(2), GpuRenderer::new(gpus[0].clone()));
+    let (want, found) = (draw(&mut cpu, &plan), draw(&mut gpu, &plan));
+    let mixed = cpu.draw_times().mixed_pixels;
+    assert!(mixed > 4 * 32_768, "{mixed} mixed pixels may be one round for each band");
+    assert_eq!(gpu.draw_times().mixed_pixels, mixed);
+    Likeness::of(&found, &want).assert(Tolerance::TWINS, "2000 x 1200 px");
+}
+
+/// More triangles in a few pixels than lists have room for, and in a single one.
+#[test]
+fn crowded_pixels_have_the_same_bytes() {
+    let mesh = scenes::mesh(&shapes::torus(520));
+    let (mut plain, mut quick) = (CpuRenderer::plain(1), CpuRenderer::new(2));
+    for size in ["2", "9"] {
+        let keys = [("size", size), ("style", "flat"), ("samples", "adaptive"), ("camera.margin", "0")];
+        let plan = scenes::plan(&mesh, &scenes::spec(&keys));
+        assert!(draw(&mut quick, &plan) == draw(&mut plain, &plan), "{size} px");
+        assert!(quick.draw_times().mixed_pixels >= 4, "{size} px");
+    }
+}
+
 /// Both back-ends find the same mixed pixels, and draw them alike. With 64-bit atomics and without.
 #[test]
 fn both_back_ends_draw_the_same_mixed_pixels() {
