@@ -263,7 +263,7 @@ fn layouts() -> Vec<(&'static str, Layout)> {
                 first count faces row_first row_end capacity large_first large_end huge_first huge_end edges_per_group
                 line_width line_smoothing line_flags line_exponent line_windows line_slices line_peak line_units
                 line_pass seen_first seen_end samples_at pass_bit layer column_first column_end seen_margin
-                alone_size groups_each cleared rgba_at slots_first slots_end
+                alone_size groups_each cleared rgba_at slots_first slots_end padding_a padding_b
             }),
         ),
         (
