@@ -24,7 +24,7 @@ struct Look {
     key: u32,
 };
 
-// How colours go from one face to another.
+// Steps of colours from one face to another.
 const STEP_NONE: u32 = 0u;
 const STEP_SLIGHT: u32 = 1u;
 const STEP_HARD: u32 = 2u;

@@ -8,7 +8,7 @@ use crate::warning::Warning;
 /// Samples per pixel of pictures that ask for adaptive ones and cannot have them.
 const INSTEAD: u32 = 16;
 
-/// What a plan draws.
+/// The kinds of things that a plan draws.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown {
     /// True if faces are filled, or an outline's triangles are.

@@ -20,7 +20,7 @@ use crate::backend::cpu::isa::dispatch;
 use crate::backend::cpu::surface::shade::Shader;
 use crate::backend::cpu::surface::waiting::{Point, Waiting};
 
-/// What mixed pixels are found to be.
+/// The colours of some mixed pixels, and the points of those at the border of all faces.
 #[derive(Default)]
 pub struct Found {
     /// By pixel: premultiplied linear RGBA, nothing behind it.
@@ -99,7 +99,7 @@ fn color_kernel(
     }
 }
 
-/// What the points of a pixel see, of those of which sets have `W` words.
+/// The faces that the points of a pixel see. Sets of these points have `W` words.
 struct Points<const W: usize> {
     faces: PixelFaces<W>,
     shares: Shares<W>,

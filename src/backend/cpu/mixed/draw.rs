@@ -18,7 +18,7 @@ pub struct MixedScratch {
     /// The triangles that some of them may show.
     lists: PixelLists,
     recent: Recent,
-    /// What they are.
+    /// The colours of some of them.
     found: Found,
     /// The points that see something in pixels at the border of all faces, for lines over them.
     pub border: BorderPoints,

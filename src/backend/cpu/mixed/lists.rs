@@ -27,11 +27,11 @@ pub struct PixelLists {
     /// By pixel, and after the last: where its items begin.
     starts: Vec<u32>,
     items: Vec<u32>,
-    /// How it ended.
+    /// The end of the last attempt to fill them.
     pub end: ListsEnd,
 }
 
-/// How the lists were left.
+/// The end of an attempt to fill lists.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ListsEnd {
     /// They have all.

@@ -42,7 +42,7 @@ const MANY_COLORED: u32 = flags::DERIVATIVE_NORMALS
     | flags::MASK
     | flags::BLEND;
 
-/// How colours go from one face to another.
+/// A step of colours from one face to another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// They go on: the faces are the same, look alike, or are linked.
@@ -111,7 +111,7 @@ impl Look {
         all
     }
 
-    /// How the colours of these faces differ from those.
+    /// The step from the colours of these faces to those of others.
     #[inline(always)]
     fn step_to(&self, other: &Self) -> Step {
         let all = self.and(other);
@@ -149,7 +149,7 @@ impl Pairs {
         Self([Pair { ids: [NOTHING; 2], step: Step::None }; Self::COUNT])
     }
 
-    /// How colours go from one of two ids to the other.
+    /// The step of colours from one of two ids to the other.
     #[inline(always)]
     pub fn step(&mut self, context: &RasterContext<'_>, a: u32, b: u32) -> Step {
         if a == b {

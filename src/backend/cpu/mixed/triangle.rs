@@ -29,7 +29,7 @@ struct Edges {
     y: [i32; 4],
     dx: [i32; 4],
     dy: [i32; 4],
-    /// What is added for half of a 1/256 px, and for the top-left rule.
+    /// Summand for half of a 1/256 px, and for the top-left rule.
     bias: [i32; 4],
     /// By how much the function grows from the first column and row to others, at most.
     growth: [i32; 4],

@@ -48,7 +48,7 @@ pub enum Kernel {
     Breaks,
     /// Those places to mixed pixels.
     MixedPixels,
-    /// What the points of mixed pixels see to colours.
+    /// Points of mixed pixels to colours.
     MixedColor,
     /// Samples to bytes, where nothing else is to be drawn.
     Paint,
