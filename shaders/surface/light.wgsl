@@ -52,24 +52,44 @@ fn light(metallic: f32, roughness: f32, n: vec3<f32>) -> Light {
         let grazing = 1.0 - clamp(n_view, 0.0, 1.0);
         let square = rn(grazing * grazing);
         let rise = rn(rn(rn(square * square) * grazing) * (1.0 - roughness));
-        let mirrored = rn(2.0 * rn(n_view * n_up)) - dot3(to_viewer, frame.screen_up.xyz);
-        let seen = rn(rn(metallic * (frame.ambient + rn(0.5 * strength))) * studio(mirrored, roughness));
+        // The view's mirror image.
+        let screen_right = frame.screen_right.xyz;
+        let right = rn(2.0 * rn(n_view * dot3(n, screen_right))) - dot3(to_viewer, screen_right);
+        let up = rn(2.0 * rn(n_view * n_up)) - dot3(to_viewer, frame.screen_up.xyz);
+        let seen = rn(rn(metallic * (frame.ambient + rn(0.5 * strength))) * surroundings(right, up, roughness));
         gain += rn(seen * (1.0 - rise));
         gloss += rn(seen * rise);
     }
     return Light(gain, gloss);
 }
 
-// Brightness of the studio in a direction that rises by `up` (the sine of its elevation).
-fn studio(up: f32, roughness: f32) -> f32 {
-    let blur = 0.2 + rn(0.8 * roughness);
-    let square = rn(blur * blur);
-    // 1 / blur and 1 / sum by one reciprocal.
-    let sum = square + rn(4.0 * rn(up * up));
-    let inverse = quick_recip(rn(blur * sum));
-    // 0 below -blur, 1 above blur.
-    let t = clamp(0.5 + rn(rn(0.5 * up) * rn(sum * inverse)), 0.0, 1.0);
-    let sky = rn(rn(t * t) * (3.0 - rn(2.0 * t)));
-    let horizon = rn(rn(0.35 * (1.0 - roughness)) * rn(rn(square * blur) * inverse));
-    return (0.36 + rn(0.79 * sky)) + horizon;
+// Brightness of the surroundings in the direction of length 1 that points so far to the right and up, on screen.
+fn surroundings(right: f32, up: f32, roughness: f32) -> f32 {
+    let alpha = max(rn(roughness * roughness), 0.0025);
+    // Half the width of a window's soft edge, and the inverse of the whole, by one reciprocal.
+    let sum = alpha + 0.7;
+    let inverse = quick_recip(rn(3.6 * rn(alpha * sum)));
+    let blur = rn(rn(6.48 * rn(alpha * alpha)) * inverse);
+    let sharpness = min(rn(rn(sum * sum) * inverse), 25.0);
+    let sky = rise(up, 0.0, min(sharpness, 2.0));
+    var windows = 0.0;
+    windows += rn(3.5 * window_share(right, up, vec4(-0.5, -0.22, 0.68, 0.86), sharpness));
+    windows += rn(3.2 * window_share(right, up, vec4(0.74, 0.92, -0.35, 0.5), sharpness));
+    windows += rn(3.2 * window_share(right, up, vec4(-0.92, -0.8, -0.4, 0.6), sharpness));
+    // Near the room's left, right, and above, a rectangle on screen covers more directions than it seems to: what
+    // is blurred sees them all.
+    return (0.08 + rn(0.34 * sky)) + rn((1.0 + rn(blur * blur)) * windows);
+}
+
+// Share of a window that is seen in a direction. Its edges: left, right, lower, upper.
+fn window_share(right: f32, up: f32, edges: vec4<f32>, sharpness: f32) -> f32 {
+    let across = rise(right, edges.x, sharpness) - rise(right, edges.y, sharpness);
+    let along = rise(up, edges.z, sharpness) - rise(up, edges.w, sharpness);
+    return rn(across * along);
+}
+
+// 0 far below a soft edge, 1 far above.
+fn rise(place: f32, edge: f32, sharpness: f32) -> f32 {
+    let t = clamp(0.5 + rn((place - edge) * sharpness), 0.0, 1.0);
+    return rn(rn(t * t) * (3.0 - rn(2.0 * t)));
 }

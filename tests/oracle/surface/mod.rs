@@ -4,5 +4,6 @@ pub mod light;
 pub mod occlusion;
 pub mod rays;
 pub mod srgb;
+pub mod surroundings;
 pub mod texture;
 pub mod visible;

@@ -8,6 +8,7 @@ use crate::oracle::obj::Shape;
 use crate::oracle::screen::{Scene, Screen};
 use crate::oracle::surface::light::{face_normal, lit, smooth_normals, weights};
 use crate::oracle::surface::srgb;
+use crate::oracle::surface::surroundings::{mirror_image, mirrored};
 use crate::oracle::vector::{V3, cross, dot, length, unit};
 use crate::support::scenes;
 use crate::support::seen::{lights, material, only_triangle};
@@ -34,11 +35,24 @@ pub struct ColorErrors {
 /// Compares the pixels that lie wholly in one triangle, which is the only one that is seen there;
 /// `normals` are by triangle corner.
 pub fn color_errors(plan: &DrawPlan<'_>, image: &Image, normals: &[[V3; 3]]) -> ColorErrors {
+    let (material, lights) = (material(plan.surface.as_ref().unwrap()), lights(plan));
+    let mut errors = ColorErrors { pixels: 0, max: 0.0 };
+    for_each_whole(plan, normals, |[x, y], normal| {
+        let want = lit(&material, &lights, normal).map(|v| 255.0 * srgb::from_linear(v));
+        let got = image.pixel(x, y);
+        for k in 0..3 {
+            errors.max = errors.max.max((want[k] - f64::from(got[k])).abs());
+        }
+        errors.pixels += 1;
+    });
+    errors
+}
+
+/// Calls `each` with the pixels that lie wholly in one triangle, which is the only one that is seen there, and the
+/// exact unit normal at their centre, on the viewer's side.
+fn for_each_whole(plan: &DrawPlan<'_>, normals: &[[V3; 3]], mut each: impl FnMut([u32; 2], V3)) {
     let scene = scene(plan);
     let screen = Screen::new(&scene);
-    let surface = plan.surface.as_ref().unwrap();
-    let (material, lights) = (material(surface), lights(plan));
-    let mut errors = ColorErrors { pixels: 0, max: 0.0 };
     for y in 0..plan.height_px {
         for x in 0..plan.width_px {
             let Some(triangle) = only_triangle(&screen, [x, y]) else { continue };
@@ -51,15 +65,9 @@ pub fn color_errors(plan: &DrawPlan<'_>, image: &Image, normals: &[[V3; 3]]) -> 
             let normal: V3 = std::array::from_fn(|k| {
                 side * (0..3).map(|i| share[i] * normals[triangle as usize][i][k]).sum::<f64>()
             });
-            let want = lit(&material, &lights, unit(normal)).map(|v| 255.0 * srgb::from_linear(v));
-            let got = image.pixel(x, y);
-            for k in 0..3 {
-                errors.max = errors.max.max((want[k] - f64::from(got[k])).abs());
-            }
-            errors.pixels += 1;
+            each([x, y], unit(normal));
         }
     }
-    errors
 }
 
 /// Exact normals at the corners of the plan's triangles.
@@ -116,6 +124,67 @@ fn whole_pixels_have_their_exact_colour() {
     }
     assert_eq!(drawn, 12 * renderers.len());
     assert!(pixels > 5000 * renderers.len(), "{pixels}");
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+}
+
+/// Brightness that metals show, by roughness, may be off from the integral by so much: RMS, of brightness with a mean
+/// of about 0.6 and windows of 3.5.
+const SURROUNDINGS_GOALS: [(&str, f64); 6] =
+    [("0.05", 0.16), ("0.15", 0.15), ("0.3", 0.22), ("0.5", 0.16), ("0.75", 0.15), ("1", 0.12)];
+/// Share of the integral by which the mean may be off.
+const SURROUNDINGS_MEAN_GOAL: f64 = 0.16;
+
+#[test]
+fn metals_mirror_surroundings_as_their_integral_does() {
+    const BASE: f64 = 0.2;
+    let mesh = scenes::mesh(&shapes::two_balls());
+    let base = format!("{:02x}", (255.0 * srgb::from_linear(BASE)).round() as u8).repeat(3);
+    let mut missed = Vec::new();
+    for (roughness, goal) in SURROUNDINGS_GOALS {
+        let spec = scenes::spec(&[
+            ("size", "160x120"),
+            ("style", "smooth"),
+            ("light.preset", "none"),
+            ("light.ambient", "1"),
+            ("light.ambient_occlusion", "0"),
+            ("surface.metallic", "1"),
+            ("surface.roughness", roughness),
+            ("surface.color", &base),
+        ]);
+        let plan = scenes::plan(&mesh, &spec);
+        let axes = [plan.projection.screen_right, plan.projection.screen_up, plan.projection.to_viewer];
+        let axes = axes.map(|axis| axis.map(f64::from));
+        let roughness: f64 = roughness.parse().unwrap();
+        for renderer in &mut renderers() {
+            let image = renderer.draw(&plan, &Deadline::default()).unwrap();
+            let (mut squares, mut sum, mut want_sum, mut pixels) = (0.0, 0.0, 0.0, 0.0);
+            for_each_whole(&plan, &true_normals(&scene(&plan), true), |[x, y], normal| {
+                let image_of_viewer = mirror_image(normal, axes[2]);
+                let want = mirrored(axes.map(|axis| dot(axis, image_of_viewer)), roughness);
+                let rise = (1.0 - dot(normal, axes[2]).clamp(0.0, 1.0)).powi(5) * (1.0 - roughness);
+                let shown = srgb::to_linear(f64::from(image.pixel(x, y)[0]) / 255.0);
+                let brightness = shown / (BASE * (1.0 - rise) + rise);
+                // Light above 0.8 is rolled off.
+                if shown < 0.79 {
+                    squares += (brightness - want).powi(2);
+                    sum += brightness;
+                    want_sum += want;
+                    pixels += 1.0;
+                }
+            });
+            let rms = f64::sqrt(squares / pixels);
+            println!(
+                "- roughness {roughness:<5} {:<4} RMS {rms:.3} (goal {goal}), mean {:.2} of {:.2}",
+                renderer.kind().name(),
+                sum / pixels,
+                want_sum / pixels
+            );
+            assert!(pixels > 4000.0, "{pixels}");
+            if rms > goal || (sum - want_sum).abs() > SURROUNDINGS_MEAN_GOAL * want_sum {
+                missed.push(format!("roughness {roughness}: {rms}"));
+            }
+        }
+    }
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 

@@ -1,8 +1,8 @@
 //! Stage shade, per point: light without images. Twin of `shaders/surface/light.wgsl`.
 //!
 //! Lambert plus the GGX lobe for each lamp, and a sky that is brighter than the ground. Metals have
-//! no diffuse colour, so they mirror a studio instead: bright above, a little brighter at the
-//! horizon, dark below, and blurred by roughness.
+//! no diffuse colour, so they mirror surroundings instead: a dark room with three bright windows, blurred by
+//! roughness.
 //!
 //! Both back-ends compute the same bits: a whole flat face has one light, and that may lie on the
 //! threshold between two bytes.
@@ -156,9 +156,12 @@ pub fn light_lanes<const N: usize>(
         let grazing = 1.0 - n_view.clamp(0.0, 1.0);
         let square = grazing * grazing;
         let rise = square * square * grazing * (1.0 - roughness[l]);
-        let mirrored = 2.0 * (n_view * n_up) - dot(projection.to_viewer, projection.screen_up);
-        let studio = studio(&inverse_of, mirrored, roughness[l]);
-        let seen = metallic[l] * (lights.ambient + 0.5 * strength) * studio;
+        // The view's mirror image.
+        let mirrored = |axis: [f32; 3], n_axis: f32| 2.0 * (n_view * n_axis) - dot(projection.to_viewer, axis);
+        let right = mirrored(projection.screen_right, dot(n, projection.screen_right));
+        let up = mirrored(projection.screen_up, n_up);
+        let room = surroundings(&inverse_of, right, up, roughness[l]);
+        let seen = metallic[l] * (lights.ambient + 0.5 * strength) * room;
         let (gain, gloss) = (light.gain[l] + seen * (1.0 - rise), light.gloss[l] + seen * rise);
         let is_metal = metallic[l] > 0.0;
         light.gain[l] = if is_metal { gain } else { light.gain[l] };
@@ -167,20 +170,49 @@ pub fn light_lanes<const N: usize>(
     light
 }
 
-/// Brightness of the studio in a direction that rises by `up` (the sine of its elevation).
+/// A window of the surroundings: a rectangle on screen, of directions of length 1. It is there twice, before the model
+/// and behind it.
+struct Window {
+    /// Left and right edge.
+    right: [f32; 2],
+    /// Lower and upper edge.
+    up: [f32; 2],
+    brightness: f32,
+}
+
+/// One above the viewer's left shoulder, and a high one at each side.
+const WINDOWS: [Window; 3] = [
+    Window { right: [-0.5, -0.22], up: [0.68, 0.86], brightness: 3.5 },
+    Window { right: [0.74, 0.92], up: [-0.35, 0.5], brightness: 3.2 },
+    Window { right: [-0.92, -0.8], up: [-0.4, 0.6], brightness: 3.2 },
+];
+
+/// Brightness of the surroundings in the direction of length 1 that points so far to the right and up, on screen.
 #[inline(always)]
-fn studio(inverse_of: impl Fn(f32) -> f32, up: f32, roughness: f32) -> f32 {
-    const GROUND: f32 = 0.36;
-    const SKY_ABOVE_GROUND: f32 = 0.79;
-    const HORIZON: f32 = 0.35;
-    let blur = 0.2 + 0.8 * roughness;
-    let square = blur * blur;
-    // 1 / blur and 1 / sum by one reciprocal.
-    let sum = square + 4.0 * (up * up);
-    let inverse = inverse_of(blur * sum);
-    // 0 below -blur, 1 above blur.
-    let t = (0.5 + (0.5 * up) * (sum * inverse)).clamp(0.0, 1.0);
-    let sky = t * t * (3.0 - 2.0 * t);
-    let horizon = (HORIZON * (1.0 - roughness)) * ((square * blur) * inverse);
-    (GROUND + SKY_ABOVE_GROUND * sky) + horizon
+fn surroundings(inverse_of: impl Fn(f32) -> f32, right: f32, up: f32, roughness: f32) -> f32 {
+    const GROUND: f32 = 0.08;
+    const SKY_ABOVE_GROUND: f32 = 0.34;
+    let alpha = (roughness * roughness).max(0.0025);
+    // Half the width of a window's soft edge, and the inverse of the whole, by one reciprocal.
+    let sum = alpha + 0.7;
+    let inverse = inverse_of(3.6 * (alpha * sum));
+    let blur = (6.48 * (alpha * alpha)) * inverse;
+    let sharpness = ((sum * sum) * inverse).min(25.0);
+    let sky = rise(up, 0.0, sharpness.min(2.0));
+    let mut windows = 0.0;
+    for window in &WINDOWS {
+        let across = rise(right, window.right[0], sharpness) - rise(right, window.right[1], sharpness);
+        let along = rise(up, window.up[0], sharpness) - rise(up, window.up[1], sharpness);
+        windows += window.brightness * (across * along);
+    }
+    // Near the room's left, right, and above, a rectangle on screen covers more directions than it seems to: what
+    // is blurred sees them all.
+    (GROUND + SKY_ABOVE_GROUND * sky) + (1.0 + blur * blur) * windows
+}
+
+/// 0 far below a soft edge, 1 far above.
+#[inline(always)]
+fn rise(place: f32, edge: f32, sharpness: f32) -> f32 {
+    let t = (0.5 + (place - edge) * sharpness).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
 }
