@@ -34,10 +34,25 @@ fn step_between(a: u32, b: u32) -> u32 {
         return STEP_NONE;
     }
     let step = step_of_looks(look_of(a), look_of(b));
-    if step != STEP_NONE && are_linked(a, b) {
+    if step == STEP_NONE {
+        return step;
+    }
+    return min(step, step_of_linked(a, b));
+}
+
+// The step between two faces of which all but the normal goes on from one to the other; a hard one between others.
+fn step_of_linked(a: u32, b: u32) -> u32 {
+    if !are_linked(a, b) {
+        return STEP_HARD;
+    }
+    let by_face = MATERIAL_LIT | MATERIAL_FACE_NORMALS;
+    if (materials[material_index(a)].flags & by_face) != by_face {
         return STEP_NONE;
     }
-    return step;
+    let front = is_negative(area_of_face(a));
+    let n_a = turned_to_viewer(face_normal(a), front) + NORMAL_SHIFT;
+    let n_b = turned_to_viewer(face_normal(b), front) + NORMAL_SHIFT;
+    return step_of_looks(Look(n_a, n_a, 0u), Look(n_b, n_b, 0u));
 }
 
 fn step_of_looks(a: Look, b: Look) -> u32 {
@@ -93,15 +108,15 @@ fn look_of(id: u32) -> Look {
     return Look(min(min(a, b), c), max(max(a, b), c), key);
 }
 
-// True if two smooth faces' colours go on from one to the other: they show the same side, and share a corner with all
-// that is interpolated between corners.
+// True if two faces' colours go on from one to the other but for their face normals: they show the same side, and
+// share a corner with all that is interpolated between corners.
 fn are_linked(a: u32, b: u32) -> bool {
     if !has(SURFACE) || a >= frame.triangle_count || b >= frame.triangle_count {
         return false;
     }
     let m = material_index(a);
     let flags = materials[m].flags;
-    let broken = MATERIAL_FACE_NORMALS | MATERIAL_DERIVATIVE_NORMALS | MATERIAL_WIRES | MATERIAL_BY_ANGLE;
+    let broken = MATERIAL_DERIVATIVE_NORMALS | MATERIAL_WIRES | MATERIAL_BY_ANGLE;
     if own_material(a) != own_material(b) || (flags & broken) != 0u || debug_of(flags) != 0u {
         return false;
     }

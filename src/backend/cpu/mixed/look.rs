@@ -11,7 +11,7 @@ use crate::backend::cpu::vector::turned_to_viewer;
 use crate::plan::{ShadedMaterial, SurfacePass, TEXTURE_NONE, flags};
 
 /// Flags of materials whose colour does not go on smoothly where faces share a corner.
-const BROKEN: u32 = flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::DEBUG | flags::WIRES | flags::BY_ANGLE;
+const BROKEN: u32 = flags::DERIVATIVE_NORMALS | flags::DEBUG | flags::WIRES | flags::BY_ANGLE;
 
 /// Largest difference of two values, squared, over their sum, up to which faces look alike: normals that
 /// differ by about 14 degrees, or colours by about 25/255.
@@ -43,7 +43,7 @@ const MANY_COLORED: u32 = flags::DERIVATIVE_NORMALS
     | flags::BLEND;
 
 /// A step of colours from one face to another.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Step {
     /// They go on: the faces are the same, look alike, or are linked.
     None,
@@ -68,17 +68,22 @@ impl Look {
     /// The look of no face at all.
     const NOTHING: Self = Self { low: [0.0; 3], high: [0.0; 3], keys: [kinds::UNIQUE | NOTHING; 2] };
 
+    /// A look of one value.
+    #[inline(always)]
+    fn of_one(v: [f32; 3], key: u32) -> Self {
+        Self { low: v, high: v, keys: [key; 2] }
+    }
+
     /// The look of a face, or of the outline's triangle, or of nothing.
     #[inline(always)]
     fn of(context: &RasterContext<'_>, id: u32) -> Self {
         if id == NOTHING {
             return Self::NOTHING;
         }
-        let of_one = |v: [f32; 3], key: u32| Self { low: v, high: v, keys: [key; 2] };
-        let unique = || of_one([0.0; 3], kinds::UNIQUE | id);
+        let unique = || Self::of_one([0.0; 3], kinds::UNIQUE | id);
         if context.is_hull(id) {
             let color = context.plan.hull.as_ref().map(|hull| hull.color(id as usize));
-            return color.map_or_else(unique, |[r, g, b, _]| of_one([r, g, b], kinds::BY_COLOR));
+            return color.map_or_else(unique, |[r, g, b, _]| Self::of_one([r, g, b], kinds::BY_COLOR));
         }
         let corners = context.screen_triangle(id);
         let surface = context.plan.surface.as_ref().filter(|surface| surface.is_shaded);
@@ -90,13 +95,15 @@ impl Look {
         let key = kinds::BY_NORMAL | surface.triangle_materials.get(id as usize).copied().unwrap_or(0);
         let shifted = |n: [f32; 3]| turned_to_viewer(n, area(&corners) < 0).map(|v| v + NORMAL_SHIFT);
         if material.flags & flags::LIT == 0 {
-            return of_one([0.0; 3], key);
+            return Self::of_one([0.0; 3], key);
         }
         if material.flags & flags::VERTEX_NORMALS == 0 {
-            return of_one(shifted(face_normal(surface, id)), key);
+            return Self::of_one(shifted(face_normal(surface, id)), key);
         }
         let Some([a, b, c]) = corner_normals(surface, id) else { return unique() };
-        [shifted(b), shifted(c)].into_iter().fold(of_one(shifted(a), key), |all, v| all.and(&of_one(v, key)))
+        [shifted(b), shifted(c)]
+            .into_iter()
+            .fold(Self::of_one(shifted(a), key), |all, v| all.and(&Self::of_one(v, key)))
     }
 
     /// The look of these faces and those.
@@ -168,9 +175,21 @@ impl Pairs {
 fn step(context: &RasterContext<'_>, [a, b]: [u32; 2]) -> Step {
     match Look::of(context, a).step_to(&Look::of(context, b)) {
         Step::None => Step::None,
-        _ if are_linked(context, a, b) => Step::None,
-        step => step,
+        step => step.min(step_of_linked(context, a, b)),
     }
+}
+
+/// The step between two faces of which all but the normal goes on from one to the other; a hard one between others.
+#[inline(always)]
+fn step_of_linked(context: &RasterContext<'_>, a: u32, b: u32) -> Step {
+    let surface = context.plan.surface.as_ref().filter(|_| are_linked(context, a, b));
+    let Some(surface) = surface else { return Step::Hard };
+    if surface.material(a as usize).flags & (flags::LIT | flags::FACE_NORMALS) != flags::LIT | flags::FACE_NORMALS {
+        return Step::None;
+    }
+    let front = area(&context.screen_triangle(a)) < 0;
+    let of = |id: u32| Look::of_one(turned_to_viewer(face_normal(surface, id), front).map(|v| v + NORMAL_SHIFT), 0);
+    of(a).step_to(&of(b))
 }
 
 #[inline(always)]
@@ -191,8 +210,8 @@ fn corner_normals(surface: &SurfacePass<'_>, id: u32) -> Option<[[f32; 3]; 3]> {
     Some([of(a)?, of(b)?, of(c)?])
 }
 
-/// True if two ids are the same, or smooth faces whose colours go on from one to the other: they show the same
-/// side, and share a corner with all that is interpolated between corners.
+/// True if two ids are the same, or faces whose colours go on from one to the other but for their face normals: they
+/// show the same side, and share a corner with all that is interpolated between corners.
 #[inline(always)]
 fn are_linked(context: &RasterContext<'_>, a: u32, b: u32) -> bool {
     if a == b {

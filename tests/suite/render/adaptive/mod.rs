@@ -72,6 +72,29 @@ fn pixels_of_many_faces_have_the_same_bytes_too() {
     assert!(smallest > 30 && largest > 600, "{smallest} to {largest} mixed pixels");
 }
 
+/// Faces with colours between their corners are alike where their normals are, as those of one colour.
+#[test]
+fn faces_that_share_a_colour_at_their_corners_go_on() {
+    let plain = shapes::torus(48);
+    let colored: String = plain
+        .lines()
+        .map(|line| format!("{line}{}\n", if line.starts_with("v ") { " 0.8 0.5 0.2" } else { "" }))
+        .collect();
+    let spec = scenes::spec(&[("style", "flat"), ("samples", "adaptive"), ("size", "240")]);
+    let mut renderers: Vec<Box<dyn Renderer>> = vec![Box::new(CpuRenderer::new(2))];
+    renderers
+        .extend(gpus().into_iter().flatten().map(|gpu| Box::new(GpuRenderer::new(gpu.clone())) as Box<dyn Renderer>));
+    for renderer in &mut renderers {
+        let mixed = [&plain, &colored].map(|obj| {
+            let mesh = scenes::mesh(obj);
+            draw(renderer.as_mut(), &scenes::plan(&mesh, &spec));
+            renderer.draw_times().mixed_pixels
+        });
+        // Faces that share no corner may look alike.
+        assert!(mixed[0] > 500 && 20 * mixed[1] <= 21 * mixed[0], "{mixed:?}");
+    }
+}
+
 /// What a picture leaves in buffers is not seen in the next one.
 #[test]
 fn fixed_samples_after_adaptive_ones_are_as_if_alone() {
