@@ -1,5 +1,5 @@
 // Stage mixed, per face: what decides its colour, as far as that is known without shading it. Twin of
-// src/backend/cpu/mixed/look.rs.
+// src/backend/cpu/mixed/find/look.rs.
 
 // Squared differences over sums up to which faces look alike, and up to which they differ slightly.
 const ALIKE: f32 = 0.020833334;
@@ -45,8 +45,7 @@ fn step_of_linked(a: u32, b: u32) -> u32 {
     if !are_linked(a, b) {
         return STEP_HARD;
     }
-    let by_face = MATERIAL_LIT | MATERIAL_FACE_NORMALS;
-    if (materials[material_index(a)].flags & by_face) != by_face {
+    if (materials[material_index(a)].flags & MATERIAL_FACE_NORMALS) == 0u {
         return STEP_NONE;
     }
     let front = is_negative(area_of_face(a));

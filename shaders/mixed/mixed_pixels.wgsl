@@ -1,5 +1,5 @@
 // Stage mixed, per pixel: whether it is mixed, and its number among those that are. Twin of MixedPixels::join in
-// src/backend/cpu/mixed/find.rs. Numbers are in no order; nothing depends on it.
+// src/backend/cpu/mixed/find/mod.rs. Numbers are in no order; nothing depends on it.
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
 
@@ -8,7 +8,7 @@
 const OWN_PLACES: u32 = 0x11u;
 const LEFT_PLACES: u32 = 0x33u;
 const UPPER_PLACES: u32 = 0x55u;
-const HARD_PLACES: u32 = 0x70u;
+const HARD_PLACES: u32 = 0xF0u;
 
 @compute @workgroup_size(WORKGROUP)
 fn mixed_pixels(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {

@@ -1,4 +1,4 @@
-// Stage mixed: the buffer of a band's mixed pixels. The CPU's is MixedPixels in src/backend/cpu/mixed/find.rs.
+// Stage mixed: the buffer of a band's mixed pixels. The CPU's is MixedPixels in src/backend/cpu/mixed/find/mod.rs.
 //
 // Its words:
 // - their number, and three unused words

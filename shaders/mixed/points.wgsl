@@ -3,12 +3,6 @@
 
 @group(1) @binding(22) var<storage, read> mixed: array<u32>;
 
-// Largest column or row of a point.
-const PLACE_MAX: i32 = 255;
-
-// Bound of edge functions in a pixel: what lies beyond has all of it inside, or outside.
-const EDGE_MAX: i32 = 0x40000000;
-
 // True if there are mixed pixels of these numbers.
 fn is_any_wanted() -> bool {
     return batch.slots_first < mixed[0];
@@ -35,13 +29,8 @@ fn draw_points(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
     }
     let corner = pixel_corner(pixel);
     let start = vec2(corner.x - s.x.x, corner.y - s.y.x);
-    let c = vec3(
-        point_edge(e.dx.x, e.dy.x, e.bias.x, start),
-        point_edge(e.dx.y, e.dy.y, e.bias.y, corner - vec2(s.x.y, s.y.y)),
-        point_edge(e.dx.z, e.dy.z, e.bias.z, corner - vec2(s.x.z, s.y.z)),
-    );
-    let most = c + PLACE_MAX * (max(e.dx, vec3(0)) + max(-e.dy, vec3(0)));
-    if (most.x | most.y | most.z) < 0 {
+    let c = point_edges(s, e, corner);
+    if is_beside(e, c) {
         return;
     }
     let first = (slot - batch.slots_first) * POINTS;
@@ -73,18 +62,4 @@ fn draw_point(s: Setup, e: Edges, c: vec3<i32>, start: vec2<i32>, i: u32, first:
     if z > 0.0 {
         keep_nearest(first + i, z, id);
     }
-}
-
-// Value of an edge function at a pixel's first point, halved. p: the pixel's corner, seen from the edge's first.
-fn point_edge(dx: i32, dy: i32, bias: i32, p: vec2<i32>) -> i32 {
-    let half = (dx - dy + bias) >> 1u;
-    let v = sub_wide(sub_wide(mul_wide(dx, p.y), mul_wide(dy, p.x)), vec2(bitcast<u32>(-half), bitcast<u32>(-half >> 31u)));
-    let high = bitcast<i32>(v.y);
-    if high < -1 || (high == -1 && v.x < 0xC0000000u) {
-        return -EDGE_MAX;
-    }
-    if high > 0 || (high == 0 && v.x > 0x40000000u) {
-        return EDGE_MAX;
-    }
-    return bitcast<i32>(v.x);
 }

@@ -15,7 +15,9 @@ use super::cpu::geometry::{clip, samples};
 use super::cpu::lines::holes::{self, inset};
 use super::cpu::lines::{coverage, hidden_lines, segment, stroke};
 use super::cpu::mixed::find::breaks;
-use super::cpu::mixed::look::{self, kinds};
+use super::cpu::mixed::find::look::{self, kinds};
+use super::cpu::mixed::find::thin;
+use super::cpu::mixed::thinness;
 use super::cpu::mixed::{points, triangle};
 use super::cpu::occlusion;
 use super::cpu::surface::{light, texture};
@@ -97,7 +99,9 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("INSIDE" = inset::INSIDE, "NARROW_PX" = inset::NARROW_PX, "LEVEL_PX" = inset::LEVEL_PX);
     // Mixed pixels.
     add_same!("", kinds: BY_NORMAL BY_COLOR UNIQUE);
-    add_same!("BREAKS_", breaks: OWN LEFT UPPER HARD);
+    add_same!("BREAKS_", breaks: OWN LEFT UPPER THIN HARD);
+    add_same!("", thinness: ASPECT HEIGHT_MAX LENGTH_MIN LENGTH_MAX);
+    add_same!("", thin: REACH_PX);
     add!("ALIKE" = look::ALIKE, "SLIGHT" = look::SLIGHT, "NORMAL_SHIFT" = look::NORMAL_SHIFT);
     add!(
         "MATERIAL_VERTEX_NORMALS" = flags::VERTEX_NORMALS,
@@ -116,7 +120,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
         "OWN_PLACES" = of_all_levels(breaks::OWN),
         "LEFT_PLACES" = of_all_levels(breaks::OWN | breaks::LEFT),
         "UPPER_PLACES" = of_all_levels(breaks::OWN | breaks::UPPER),
-        "HARD_PLACES" = (breaks::OWN | breaks::LEFT | breaks::UPPER) << breaks::HARD,
+        "HARD_PLACES" = (breaks::OWN | breaks::LEFT | breaks::UPPER | breaks::THIN) << breaks::HARD,
     );
     // Occlusion.
     add!("NOWHERE" = occlusion::grid::NOWHERE, "BIAS" = occlusion::gather::BIAS, "GAIN" = occlusion::gather::GAIN);
@@ -172,7 +176,7 @@ fn kernels() -> Vec<Kernel> {
         Kernel::Coverage,
     ];
     all.extend([Kernel::Holes, Kernel::LineLight, Kernel::Resolve, Kernel::Paint]);
-    all.extend([Kernel::Breaks, Kernel::MixedPixels, Kernel::MixedColor]);
+    all.extend([Kernel::Breaks, Kernel::Thin, Kernel::MixedPixels, Kernel::MixedColor]);
     for write in [SampleWrite::Both, SampleWrite::Depth, SampleWrite::Id] {
         all.push(Kernel::VisibilityFew { write });
         for target in [SampleTarget::Visibility, SampleTarget::Layer, SampleTarget::Points] {

@@ -5,6 +5,8 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
+use crate::spec::{ADAPTIVE, Samples};
+
 /// Everything that was measured.
 #[derive(Clone, Debug, Default, Deserialize)]
 pub struct ErrorTable {
@@ -16,12 +18,30 @@ pub struct ErrorTable {
     rows: Vec<Row>,
 }
 
+/// A number of samples, or the word for adaptive ones.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(try_from = "serde_json::Value")]
+struct TableSamples(Samples);
+
+impl TryFrom<serde_json::Value> for TableSamples {
+    type Error = String;
+
+    fn try_from(value: serde_json::Value) -> Result<Self, String> {
+        let number = value.as_u64().and_then(|number| u32::try_from(number).ok());
+        match number {
+            Some(number) if Samples::FIXED.contains(&number) => Ok(Self(Samples::Fixed(number))),
+            None if value == ADAPTIVE => Ok(Self(Samples::Adaptive)),
+            _ => Err(format!("{value} is no number of samples")),
+        }
+    }
+}
+
 /// A technique on a kind of back-end with a number of samples.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Row {
     technique: String,
     backend: String,
-    samples: u32,
+    samples: TableSamples,
     /// The largest RMSE of its scenes, /255.
     error: f64,
     ms_per_megapixel: f64,
@@ -39,12 +59,15 @@ impl ErrorTable {
 
     /// The row of a technique on the back-end of this name; the CPU's row where the table has no
     /// GPU, since their pictures agree.
-    pub fn row(&self, technique: &str, backend: &str, samples: u32) -> Option<&Row> {
-        let find = |backend: &str| {
-            let is_it = |row: &&Row| row.technique == technique && row.backend == backend && row.samples == samples;
+    ///
+    /// With adaptive samples, techniques that do not get better by them have the row of the samples that all pixels have.
+    pub fn row(&self, technique: &str, backend: &str, samples: Samples) -> Option<&Row> {
+        let find = |backend: &str, samples: Samples| {
+            let is_it = |row: &&Row| row.technique == technique && row.backend == backend && row.samples.0 == samples;
             self.rows.iter().find(is_it)
         };
-        find(backend).or_else(|| find("cpu"))
+        let of = |samples: Samples| find(backend, samples).or_else(|| find("cpu", samples));
+        of(samples).or_else(|| of(Samples::Fixed(samples.per_pixel())))
     }
 
     /// The expected error of a picture of so many pixels, RMSE in /255.
@@ -84,7 +107,7 @@ mod tests {
         let mut found = 0;
         for technique in techniques {
             for backend in ["cpu", "gpu"] {
-                for samples in [1, 4, 8, 16] {
+                for samples in [1, 4, 8, 16].map(Samples::Fixed).into_iter().chain([Samples::Adaptive]) {
                     let row = table.row(technique, backend, samples).unwrap();
                     let [thumbnail, measured, large] = [64.0, 512.0, 2048.0].map(|s: f64| table.error(row, s * s));
                     assert!(measured > 0.0 && measured <= thumbnail && thumbnail <= 255.0, "{row:?}");
@@ -95,6 +118,6 @@ mod tests {
                 }
             }
         }
-        assert_eq!(found, 72);
+        assert_eq!(found, 90);
     }
 }

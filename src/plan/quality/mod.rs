@@ -111,8 +111,10 @@ fn candidates(
     triangles: usize,
     has_gpu: bool,
 ) -> Vec<Candidate> {
-    let fixed = || Samples::FIXED.iter().map(|&samples| Samples::Fixed(samples));
-    let samples = if target.open.samples { fixed().collect() } else { vec![spec.image.samples] };
+    // Without surfaces there are none that are adaptive.
+    let adaptive = styles(spec).any(|layers| layers.surface.is_some()).then_some(Samples::Adaptive);
+    let all_samples = || Samples::FIXED.iter().map(|&samples| Samples::Fixed(samples)).chain(adaptive);
+    let samples = if target.open.samples { all_samples().collect() } else { vec![spec.image.samples] };
     let has_open_wire = target.open.wire || target.open.material_wires.contains(&true);
     // The width of the other methods depends on each triangle's size.
     let in_pixels = WIRE_METHODS.iter().map(|row| row.method).filter(|method| method.has_pixel_width());
@@ -172,8 +174,7 @@ fn as_wide(wire: &Wire, method: WireMethod) -> Option<Wire> {
     })
 }
 
-/// The error and the time of a picture; None where the table does not have one of its techniques. With adaptive
-/// samples they are those of the samples that all pixels have.
+/// The error and the time of a picture; None where the table does not have one of its techniques.
 fn expect(table: &ErrorTable, spec: &Spec, backend: &str, triangles: usize) -> Option<[f64; 2]> {
     let mut techniques: Vec<&str> = styles(spec).flat_map(techniques).collect();
     techniques.extend(spec.topology.map(|_| word_for(WireMethod::Exact)));
@@ -182,7 +183,7 @@ fn expect(table: &ErrorTable, spec: &Spec, backend: &str, triangles: usize) -> O
     let pixels = f64::from(spec.image.width_px) * f64::from(spec.image.height_px);
     let (mut error, mut time_ms) = (0.0_f64, 0.0);
     for technique in techniques {
-        let row = table.row(technique, backend, spec.image.samples.per_pixel())?;
+        let row = table.row(technique, backend, spec.image.samples)?;
         error = error.max(table.error(row, pixels));
         time_ms += row.time_ms(pixels, triangles as f64);
     }

@@ -4,7 +4,7 @@
 //!     cargo bench --bench accuracy                            # all scenes; some minutes
 //!     cargo bench --bench accuracy -- --quick                 # few and small scenes, few rounds; under a minute
 //!     cargo bench --bench accuracy -- --scene 'deep rings'    # one scene, as often as it is named
-//!     cargo bench --bench accuracy -- --write                 # all, and docs/accuracy.{json,md}, docs/work-precision.svg
+//!     cargo bench --bench accuracy -- --write                 # all, and docs/accuracy.{json,md}, docs/{work-precision,whole-pictures}.svg
 //!                                                             # and src/plan/quality/error_table.json
 //!     cargo bench --bench accuracy -- --table-only            # the last of these, from docs/accuracy.json as it is
 //!
@@ -109,7 +109,8 @@ fn write(rows: &[Row], machine: &Machine, options: &Options) {
     let files = [
         ("accuracy.json", json::document(machine, options.effort, &options.scenes, rows)),
         ("accuracy.md", goals::page(rows, machine, options.effort, &before)),
-        ("work-precision.svg", plot::svg(rows, machine)),
+        ("work-precision.svg", plot::svg(rows, machine, &plot::TECHNIQUES)),
+        ("whole-pictures.svg", plot::svg(rows, machine, &plot::WHOLE)),
     ];
     for (name, text) in files {
         std::fs::write(folder.join(name), text).unwrap_or_else(|e| panic!("docs/{name}: {e}"));

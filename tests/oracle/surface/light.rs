@@ -1,15 +1,18 @@
-//! Part 4: the colour of a lit surface that is no metal.
+//! Part 4: the colour of a lit surface.
 //!
 //! Each lamp adds Lambert's diffuse light and a GGX highlight (Walter et al. 2007) in the short
 //! form that needs no visibility term of its own (Karis 2013, "Optimizing PBR for Mobile"), with a
-//! reflectance of 0.04 head on. Light from everywhere is brighter from above than from below.
+//! reflectance of 0.04 head on. Light from everywhere is brighter from above than from below. Metals have highlights of
+//! their own colour, and mirror their surroundings.
 
 use super::super::vector::{V2, V3, cross, dot, length, sub, unit};
+use super::surroundings::{blurred, mirror_image};
 
 /// A surface's material. Colours are linear.
 #[derive(Clone, Copy, Debug)]
 pub struct Material {
     pub base: V3,
+    pub metallic: f64,
     pub roughness: f64,
 }
 
@@ -26,23 +29,34 @@ pub struct Lamp {
 pub struct Lights {
     pub lamps: Vec<Lamp>,
     pub ambient: f64,
-    pub up: V3,
+    /// The camera's axes: right, up, and towards the viewer.
+    pub axes: [V3; 3],
 }
 
 /// The colour of a surface with unit normal `n` on the viewer's side.
 pub fn lit(material: &Material, lights: &Lights, n: V3) -> V3 {
     let alpha = (material.roughness * material.roughness).max(0.0025);
-    let mut diffuse = lights.ambient * (0.7 + 0.3 * dot(n, lights.up));
-    let mut highlight = 0.0;
+    let mut diffuse = lights.ambient * (0.7 + 0.3 * dot(n, lights.axes[1]));
+    let (mut highlight, mut strengths) = (0.0, 0.0);
     for lamp in &lights.lamps {
         let received = lamp.strength * dot(n, lamp.to_light).max(0.0);
         let n_h = dot(n, lamp.halfway).max(0.0);
         let l_h = dot(lamp.to_light, lamp.halfway);
         let d = 1.0 + n_h * n_h * (alpha * alpha - 1.0);
         diffuse += received;
+        strengths += lamp.strength;
         highlight += received * (alpha / d) * (alpha / d) / ((l_h * l_h).max(0.1) * (4.0 * material.roughness + 2.0));
     }
-    material.base.map(|base| rolled_off(base * diffuse + 0.04 * highlight))
+    let to_viewer = lights.axes[2];
+    let image = mirror_image(n, to_viewer);
+    let seen = (lights.ambient + 0.5 * strengths)
+        * blurred(dot(image, lights.axes[0]), dot(image, lights.axes[1]), material.roughness);
+    let rise = (1.0 - dot(n, to_viewer).clamp(0.0, 1.0)).powi(5) * (1.0 - material.roughness);
+    material.base.map(|base| {
+        let matte = base * diffuse + 0.04 * highlight;
+        let metal = base * highlight + seen * (base * (1.0 - rise) + rise);
+        rolled_off((1.0 - material.metallic) * matte + material.metallic * metal)
+    })
 }
 
 /// Light as it is shown: above 0.8, half of the rest to white is left where there is 0.2 more, a third

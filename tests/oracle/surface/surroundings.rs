@@ -1,4 +1,5 @@
-//! The surroundings that metals mirror: a dark room with windows, integrated over the lobe of a rough surface.
+//! The surroundings that metals mirror, a dark room with windows: by definition, blurred by soft edges, and, what that
+//! stands in for, integrated over the lobe of a rough surface.
 
 use super::super::vector::{V3, cross, dot, unit};
 
@@ -18,6 +19,22 @@ fn brightness(direction: V3) -> f64 {
     };
     let windows: f64 = WINDOWS.iter().filter(is_in).map(|window| window[4]).sum();
     0.08 + 0.34 * t * t * (3.0 - 2.0 * t) + windows
+}
+
+/// Brightness by definition in a direction of length 1 that points so far to the right and up.
+pub fn blurred(right: f64, up: f64, roughness: f64) -> f64 {
+    let alpha = (roughness * roughness).max(0.0025);
+    let blur = 1.8 * alpha / (alpha + 0.7);
+    let rise = |place: f64, edge: f64, width: f64| {
+        let t = (0.5 + 0.5 * (place - edge) / width).clamp(0.0, 1.0);
+        t * t * (3.0 - 2.0 * t)
+    };
+    let width = blur.max(0.02);
+    let window = |[left, right_edge, lower, upper, brightness]: &[f64; 5]| {
+        let across = rise(right, *left, width) - rise(right, *right_edge, width);
+        brightness * across * (rise(up, *lower, width) - rise(up, *upper, width))
+    };
+    0.08 + 0.34 * rise(up, 0.0, width.max(0.25)) + (1.0 + blur * blur) * WINDOWS.iter().map(window).sum::<f64>()
 }
 
 /// Brightness that a rough mirror shows from the direction that a smooth one would show: the mean over GGX's halfway

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use meshsnap::spec::WireMethod;
+use meshsnap::spec::{Samples, WireMethod};
 
 use crate::measure::scenes::{SCENES, SMALL, Scene};
 use crate::measure::table::{Machine, table};
@@ -35,7 +35,8 @@ fn machine() -> Machine {
 #[test]
 fn every_technique_is_measured_and_exact_wires_err_least() {
     let back_ends = if gpus().is_some() { 3 } else { 2 };
-    assert_eq!(rows().len(), 2 * 5 * back_ends * SAMPLES.len());
+    // Wires alone cannot have adaptive samples.
+    assert_eq!(rows().len(), 2 * 5 * back_ends * (SAMPLES.len() - 1));
     for row in rows() {
         let e = &row.errors;
         let numbers = [row.median_ms, row.time_ratio, e.rmse, e.max, e.flip, e.ink.unwrap()];
@@ -67,7 +68,7 @@ fn outlines_faces_and_textures_are_measured_too() {
         let errors = |technique, samples| {
             rows.iter().find(|row| row.technique == technique && row.samples == samples).unwrap().errors
         };
-        let at = |technique| errors(technique, 4);
+        let at = |technique| errors(technique, Samples::Fixed(4));
         let rmse = |technique| at(technique).rmse;
         match scene.family {
             Family::Outlines => {
@@ -77,7 +78,7 @@ fn outlines_faces_and_textures_are_measured_too() {
                 // are pixels at the roots of teeth, where edges that the gear itself hides nearly
                 // meet those that are seen.
                 assert!(contour < 1.0 && contour < hull && hull < 22.0, "{contour}, {hull}");
-                let most = errors(Technique::Hull, 16).rmse;
+                let most = errors(Technique::Hull, Samples::Fixed(16)).rmse;
                 assert!(most < 14.5, "{most}");
                 let ink = [Technique::Contour, Technique::Hull].map(|technique| at(technique).ink.unwrap());
                 assert!(ink.iter().all(|ink| (ink - 1.0).abs() < 0.02), "{ink:?}");
@@ -87,20 +88,33 @@ fn outlines_faces_and_textures_are_measured_too() {
                 println!("textures: {error} of {pixels} pixels");
                 assert!(error < 6.0 && pixels > 5000.0, "{error} of {pixels} pixels");
             }
+            Family::Whole => {
+                for &technique in scene.family.techniques() {
+                    let [four, many, adaptive] =
+                        [Samples::Fixed(4), Samples::Fixed(64), Samples::Adaptive].map(|s| errors(technique, s).rmse);
+                    println!("{}: {four} with 4, {many} with 64, {adaptive} with adaptive samples", technique.name());
+                    // Lines over all borders err by themselves.
+                    let is_lined = [Technique::WiredFaces, Technique::OutlinedFaces].contains(&technique);
+                    let most = if is_lined { 1.05 * four } else { 0.3 * four };
+                    assert!(adaptive < most && many < most && adaptive < 0.7, "{technique:?}");
+                }
+            }
             _ => {
                 assert!(rmse(Technique::FaceNormals) < 0.4, "{}", rmse(Technique::FaceNormals));
                 assert!(rmse(Technique::DerivativeNormals) < 12.0, "{}", rmse(Technique::DerivativeNormals));
             }
         }
-        assert_eq!(rows.len(), 2 * scene.family.techniques().len() * SAMPLES.len());
+        // A contour alone cannot have adaptive samples.
+        let fixed = usize::from(scene.family == Family::Outlines);
+        assert_eq!(rows.len(), 2 * (scene.family.techniques().len() * scene.family.samples().len() - fixed));
         measured += 1;
     }
-    assert_eq!(measured, 3);
+    assert_eq!(measured, 4);
 }
 
 #[test]
 fn the_plot_is_well_formed() {
-    let svg = plot::svg(rows(), &machine());
+    let svg = plot::svg(rows(), &machine(), &plot::TECHNIQUES);
     let tags = check_xml(&svg).unwrap_or_else(|e| panic!("{e}\n{svg}"));
     assert!(tags > 60, "{tags} tags");
     for words in ["exact", "fwidth-min", "CPU, 2 threads", "RMSE, /255", "A &amp; B &lt;C&gt;"] {
@@ -135,10 +149,10 @@ fn json_and_table_have_every_row() {
 #[test]
 fn the_page_keeps_what_the_suite_measured() {
     let first = goals::page(rows(), &machine(), EFFORT, "");
-    assert_eq!(first.lines().filter(|line| line.starts_with("| ") && line.ends_with(" |")).count(), 12);
+    assert_eq!(first.lines().filter(|line| line.starts_with("| ") && line.ends_with(" |")).count(), 16);
     assert!(first.contains("load average 4.0"), "{first}");
     let missing = first.matches("measured by: `cargo test --test suite ").count();
-    assert_eq!(missing, 7, "{first}");
+    assert_eq!(missing, 9, "{first}");
     let line = first.lines().find(|line| line.starts_with("| 6 |")).unwrap();
     let at = line.find("measured by").unwrap();
     let filled = first.replace(line, &format!("{}0 and 0 |", &line[..at]));

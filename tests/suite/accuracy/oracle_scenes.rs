@@ -150,14 +150,17 @@ fn normals_weights_and_light_are_what_is_known() {
     // Lambert: a lamp at 60 degrees gives half; at roughness 1 the highlight is 0.04 / 6 of that at
     // l.h = 1.
     let lamp = Lamp { to_light: [0.0, 0.0, 1.0], halfway: [0.0, 0.0, 1.0], strength: 1.0 };
-    let lights = Lights { lamps: vec![lamp], ambient: 0.0, up: [0.0, 1.0, 0.0] };
+    let lights = Lights { lamps: vec![lamp], ambient: 0.0, axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
     let tilted = [0.0, (3.0_f64).sqrt() / 2.0, 0.5];
-    let color = lit(&Material { base: [0.5; 3], roughness: 1.0 }, &lights, tilted);
+    let color = lit(&Material { base: [0.5; 3], metallic: 0.0, roughness: 1.0 }, &lights, tilted);
     assert!((color[0] - (0.25 + 0.04 / 6.0 * 0.5)).abs() < 1e-12, "{color:?}");
-    let dark = lit(&Material { base: [0.5; 3], roughness: 1.0 }, &lights, [0.0, 0.0, -1.0]);
+    let dark = lit(&Material { base: [0.5; 3], metallic: 0.0, roughness: 1.0 }, &lights, [0.0, 0.0, -1.0]);
     assert_eq!(dark, [0.0; 3]);
-    let ambient =
-        lit(&Material { base: [0.5; 3], roughness: 0.6 }, &Lights { ambient: 0.4, ..lights }, [0.0, 1.0, 0.0]);
+    let ambient = lit(
+        &Material { base: [0.5; 3], metallic: 0.0, roughness: 0.6 },
+        &Lights { ambient: 0.4, ..lights },
+        [0.0, 1.0, 0.0],
+    );
     assert!((ambient[0] - 0.2).abs() < 1e-12, "{ambient:?}");
 
     assert!(

@@ -5,13 +5,13 @@ use meshsnap::limits::Deadline;
 use meshsnap::plan::{DrawPlan, flags};
 
 use crate::oracle::obj::Shape;
-use crate::oracle::screen::{Scene, Screen};
-use crate::oracle::surface::light::{face_normal, lit, smooth_normals, weights};
+use crate::oracle::screen::Screen;
+use crate::oracle::surface::light::{face_normal, lit};
 use crate::oracle::surface::srgb;
 use crate::oracle::surface::surroundings::{mirror_image, mirrored};
 use crate::oracle::vector::{V3, cross, dot, length, unit};
 use crate::support::scenes;
-use crate::support::seen::{lights, material, only_triangle};
+use crate::support::seen::{corner_normals, lights, material, normal_at, only_triangle};
 use crate::support::shapes::{self, Random};
 use crate::support::truth::{cases, renderers, scene};
 
@@ -57,26 +57,9 @@ fn for_each_whole(plan: &DrawPlan<'_>, normals: &[[V3; 3]], mut each: impl FnMut
         for x in 0..plan.width_px {
             let Some(triangle) = only_triangle(&screen, [x, y]) else { continue };
             let center = [f64::from(x) + 0.5, f64::from(y) + 0.5];
-            let corners =
-                scene.triangles[triangle as usize].map(|v| scene.camera.homogeneous(scene.positions[v as usize]));
-            let [a, b, c] = corners.map(|h| [h[0], h[1], h[3]]);
-            let side = if dot(a, cross(b, c)) < 0.0 { 1.0 } else { -1.0 };
-            let share = weights(corners, center);
-            let normal: V3 = std::array::from_fn(|k| {
-                side * (0..3).map(|i| share[i] * normals[triangle as usize][i][k]).sum::<f64>()
-            });
-            each([x, y], unit(normal));
+            each([x, y], normal_at(&scene, normals, triangle, center));
         }
     }
-}
-
-/// Exact normals at the corners of the plan's triangles.
-fn true_normals(scene: &Scene, is_smooth: bool) -> Vec<[V3; 3]> {
-    if is_smooth {
-        return smooth_normals(&scene.positions, &scene.triangles, 30.0);
-    }
-    let flat = |t: &[u32; 3]| [face_normal(t.map(|v| scene.positions[v as usize])).unwrap_or([0.0, 0.0, 1.0]); 3];
-    scene.triangles.iter().map(flat).collect()
 }
 
 #[test]
@@ -93,22 +76,27 @@ fn whole_pixels_have_their_exact_colour() {
     let mut renderers = renderers();
     for (name, obj) in shapes {
         let mesh = scenes::mesh(&obj());
-        for (style, light, roughness) in
-            [("flat", "headlight", "0.6"), ("flat", "three-point", "0.15"), ("smooth", "headlight", "0.3")]
-        {
+        for (style, light, roughness, metallic) in [
+            ("flat", "headlight", "0.6", "0"),
+            ("flat", "three-point", "0.15", "0"),
+            ("smooth", "headlight", "0.3", "0"),
+            ("flat", "headlight", "0.2", "1"),
+            ("flat", "three-point", "0.7", "0.5"),
+            ("smooth", "studio", "0.6", "1"),
+        ] {
             let spec = scenes::spec(&[
                 ("size", "200x160"),
                 ("style", style),
                 ("light.preset", light),
                 ("surface.roughness", roughness),
-                ("surface.metallic", "0"),
+                ("surface.metallic", metallic),
                 ("surface.color", "c08040"),
             ]);
             let plan = scenes::plan(&mesh, &spec);
-            let normals = true_normals(&scene(&plan), style == "smooth");
+            let normals = corner_normals(&scene(&plan), style == "smooth");
             for renderer in &mut renderers {
                 let errors = color_errors(&plan, &renderer.draw(&plan, &Deadline::default()).unwrap(), &normals);
-                let what = format!("- {name}, {style}, {light}, {}", renderer.kind().name());
+                let what = format!("- {name}, {style}, {light}, {metallic} metal, {}", renderer.kind().name());
                 let gate = if style == "smooth" { SMOOTH_NOW } else { FLAT_NOW };
                 println!(
                     "{what:<44} max {:.3} of {} pixels (gate {gate}, goal {COLOR_GOAL})",
@@ -122,8 +110,8 @@ fn whole_pixels_have_their_exact_colour() {
             }
         }
     }
-    assert_eq!(drawn, 12 * renderers.len());
-    assert!(pixels > 5000 * renderers.len(), "{pixels}");
+    assert_eq!(drawn, 24 * renderers.len());
+    assert!(pixels > 10_000 * renderers.len(), "{pixels}");
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 
@@ -158,7 +146,7 @@ fn metals_mirror_surroundings_as_their_integral_does() {
         for renderer in &mut renderers() {
             let image = renderer.draw(&plan, &Deadline::default()).unwrap();
             let (mut squares, mut sum, mut want_sum, mut pixels) = (0.0, 0.0, 0.0, 0.0);
-            for_each_whole(&plan, &true_normals(&scene(&plan), true), |[x, y], normal| {
+            for_each_whole(&plan, &corner_normals(&scene(&plan), true), |[x, y], normal| {
                 let image_of_viewer = mirror_image(normal, axes[2]);
                 let want = mirrored(axes.map(|axis| dot(axis, image_of_viewer)), roughness);
                 let rise = (1.0 - dot(normal, axes[2]).clamp(0.0, 1.0)).powi(5) * (1.0 - roughness);

@@ -5,9 +5,10 @@ use meshsnap::plan::{DrawPlan, Faces, Shown, SurfacePass};
 use crate::oracle::camera::{Camera, project};
 use crate::oracle::coverage::{Coverage, classify, snap};
 use crate::oracle::screen::{Scene, Screen, Sides};
-use crate::oracle::surface::light::{Lamp, Lights, Material};
-use crate::oracle::surface::rays::nearest;
+use crate::oracle::surface::light::{Lamp, Lights, Material, face_normal, lit, smooth_normals, weights};
+use crate::oracle::surface::rays::{Pen, nearest, picture};
 use crate::oracle::surface::visible::{self, Segment};
+use crate::oracle::vector::{V2, V3, cross, dot, unit};
 
 /// The plan's numbers and nothing else: its geometry, and the edges of its first line pass.
 pub fn scene(plan: &DrawPlan<'_>) -> Scene {
@@ -83,9 +84,8 @@ pub fn only_triangle(screen: &Screen, pixel: [u32; 2]) -> Option<u32> {
 /// The one material of a surface.
 pub fn material(surface: &SurfacePass<'_>) -> Material {
     let [look] = &surface.materials[..] else { panic!("{} materials", surface.materials.len()) };
-    assert_eq!(look.metallic, 0.0);
     let [r, g, b, _] = look.base_color.map(f64::from);
-    Material { base: [r, g, b], roughness: f64::from(look.roughness) }
+    Material { base: [r, g, b], metallic: f64::from(look.metallic), roughness: f64::from(look.roughness) }
 }
 
 /// The lights on a plan's surface.
@@ -97,5 +97,39 @@ pub fn lights(plan: &DrawPlan<'_>) -> Lights {
         halfway: wide(lamp.halfway),
         strength: f64::from(lamp.strength),
     });
-    Lights { lamps: lamps.collect(), ambient: f64::from(lights.ambient), up: wide(plan.projection.screen_up) }
+    let axes = [plan.projection.screen_right, plan.projection.screen_up, plan.projection.to_viewer].map(wide);
+    Lights { lamps: lamps.collect(), ambient: f64::from(lights.ambient), axes }
+}
+
+/// Exact normals by corner of each triangle.
+pub fn corner_normals(scene: &Scene, is_smooth: bool) -> Vec<[V3; 3]> {
+    if is_smooth {
+        return smooth_normals(&scene.positions, &scene.triangles, 30.0);
+    }
+    let flat = |t: &[u32; 3]| [face_normal(t.map(|v| scene.positions[v as usize])).unwrap_or([0.0, 0.0, 1.0]); 3];
+    scene.triangles.iter().map(flat).collect()
+}
+
+/// The exact unit normal on the viewer's side at a point of a triangle, from those at the triangles' corners.
+pub fn normal_at(scene: &Scene, normals: &[[V3; 3]], triangle: u32, p: V2) -> V3 {
+    let corners = scene.triangles[triangle as usize].map(|v| scene.camera.homogeneous(scene.positions[v as usize]));
+    let [a, b, c] = corners.map(|h| [h[0], h[1], h[3]]);
+    let side = if dot(a, cross(b, c)) < 0.0 { 1.0 } else { -1.0 };
+    let share = weights(corners, p);
+    let of = |k: usize| side * (0..3).map(|i| share[i] * normals[triangle as usize][i][k]).sum::<f64>();
+    unit([of(0), of(1), of(2)])
+}
+
+/// The exact linear colours of a plan's faces and of the lines over them, from `side` squared points in each pixel.
+pub fn whole_picture(plan: &DrawPlan<'_>, is_smooth: bool, side: u32) -> Vec<V3> {
+    let scene = scene(plan);
+    let normals = corner_normals(&scene, is_smooth);
+    let (material, lights) = (material(plan.surface.as_ref().unwrap()), lights(plan));
+    let shade = |triangle: u32, p: V2| lit(&material, &lights, normal_at(&scene, &normals, triangle, p));
+    let background = [0, 1, 2].map(|k| f64::from(plan.background[k]));
+    let pass = plan.lines.first();
+    let segments = pass.map_or_else(Vec::new, |_| segments(plan));
+    let color = pass.map_or([0.0; 3], |pass| [0, 1, 2].map(|k| f64::from(pass.color[k])));
+    let pen = Pen { segments: &segments, width: pass.map_or(0.0, |pass| f64::from(pass.width_px)), color };
+    picture(&Screen::new(&scene), &pen, background, side, shade)
 }

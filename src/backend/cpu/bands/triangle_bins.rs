@@ -20,6 +20,8 @@ pub struct TriangleBin {
     pub fronts: BandLists,
     /// Ids of those that face away.
     pub backs: BandLists,
+    /// Those of both that are thin, where they are looked for.
+    pub thin: BandLists,
     /// The sides that the chunk's triangles show.
     pub sides: Vec<Sides>,
     /// Id and pieces of clipped triangles.
@@ -40,6 +42,7 @@ impl TriangleBin {
             ids: pass.ids.clone(),
             fronts: BandLists::new(kept.fronts, bands),
             backs: BandLists::new(kept.backs, bands),
+            thin: BandLists::new(kept.thin, bands),
             sides: kept.sides,
             pieces: Vec::new(),
             piece_bands: Bin::new(bands, TALL_BANDS),

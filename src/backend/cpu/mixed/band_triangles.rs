@@ -35,6 +35,7 @@ enum Kind {
     Pieces,
     Fronts,
     Backs,
+    Thin,
 }
 
 impl<'a> BandTriangles<'a> {
@@ -50,8 +51,19 @@ impl<'a> BandTriangles<'a> {
 
     /// Calls `each` for each triangle until it breaks off.
     #[inline(always)]
-    pub fn for_each(&self, mut each: impl FnMut(ScreenTriangle) -> ControlFlow<()>) -> ControlFlow<()> {
-        for kind in [Kind::Pieces, Kind::Fronts, Kind::Backs] {
+    pub fn for_each(&self, each: impl FnMut(ScreenTriangle) -> ControlFlow<()>) -> ControlFlow<()> {
+        self.for_each_of(&[Kind::Pieces, Kind::Fronts, Kind::Backs], each)
+    }
+
+    /// The same of those that are thin. None of them is clipped.
+    #[inline(always)]
+    pub fn for_each_thin(&self, each: impl FnMut(ScreenTriangle) -> ControlFlow<()>) -> ControlFlow<()> {
+        self.for_each_of(&[Kind::Thin], each)
+    }
+
+    #[inline(always)]
+    fn for_each_of(&self, kinds: &[Kind], mut each: impl FnMut(ScreenTriangle) -> ControlFlow<()>) -> ControlFlow<()> {
+        for kind in kinds {
             for (bin, before) in self.bins.iter().zip(&self.pieces_before) {
                 // One place that calls `each`, so that it is inlined.
                 let (listed, others) = match kind {
@@ -60,6 +72,7 @@ impl<'a> BandTriangles<'a> {
                     }
                     Kind::Fronts => bin.fronts.items_in(self.band),
                     Kind::Backs => bin.backs.items_in(self.band),
+                    Kind::Thin => bin.thin.items_in(self.band),
                 };
                 for ids in [listed, &others] {
                     for &item in ids {

@@ -47,10 +47,10 @@ pub fn draw_mixed(
     mut each: impl FnMut(u32, u32, [f32; 4]),
 ) {
     let MixedScratch { pixels, lists, recent, found, border } = scratch;
-    find(context.isa, context, samples, pixels);
+    let triangles = BandTriangles::new(context, bins);
+    find(context.isa, context, &triangles, samples, pixels);
     let all = pixels.columns.len();
     context.watch.count_mixed(all);
-    let triangles = BandTriangles::new(context, bins);
     recent.clear();
     let width = samples.size_px[0] as usize;
     border.reset(if context.plan.lines.is_empty() {

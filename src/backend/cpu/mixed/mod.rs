@@ -1,7 +1,7 @@
 //! Stage mixed, per pixel, of plans with adaptive samples: pixels near which faces meet that differ in
 //! colour are drawn again, from 64 or 256 coverage points each.
 //!
-//! [`look`] says what decides the colour of a face, [`find`] which pixels are mixed. [`lists`] has the triangles that
+//! [`find`] says which pixels are mixed, by what decides the colours of their faces ([`find::look`]). [`lists`] has the triangles that
 //! each may show, of those of the band ([`band_triangles`]). [`points`] has the points of a pixel, [`triangle`] says which of
 //! them a triangle covers, [`faces`] and [`crowd`] which face each sees, [`shares`] and [`color`] what colour that makes.
 //! [`draw`] runs them for a band.
@@ -13,10 +13,10 @@ pub(crate) mod draw;
 mod faces;
 pub(crate) mod find;
 pub(crate) mod lists;
-pub(crate) mod look;
 #[cfg(target_arch = "x86_64")]
 mod outside_avx2;
 pub(crate) mod points;
 mod recent;
 mod shares;
+pub(crate) mod thinness;
 pub(crate) mod triangle;

@@ -17,6 +17,7 @@ const STROKE_WORDS: &str = include_str!("../../../../shaders/lines/stroke_words.
 const STROKE: &str = include_str!("../../../../shaders/lines/stroke.wgsl");
 const PLANES: &str = include_str!("../../../../shaders/geometry/planes.wgsl");
 const CORNERS: &str = include_str!("../../../../shaders/geometry/corners.wgsl");
+const CULLING: &str = include_str!("../../../../shaders/geometry/culling.wgsl");
 const TILE: &str = include_str!("../../../../shaders/geometry/tile.wgsl");
 const WORK: &str = include_str!("../../../../shaders/geometry/work.wgsl");
 const TRIANGLE: &str = include_str!("../../../../shaders/geometry/triangle.wgsl");
@@ -33,6 +34,9 @@ const SPREAD: &str = include_str!("../../../../shaders/occlusion/spread.wgsl");
 const SMALL: &str = include_str!("../../../../shaders/geometry/small.wgsl");
 const TILE_SAMPLES: &str = include_str!("../../../../shaders/geometry/tile_samples.wgsl");
 const MIXED_PLACE: &str = include_str!("../../../../shaders/mixed/place.wgsl");
+const SEEN_FACES: &str = include_str!("../../../../shaders/mixed/seen_faces.wgsl");
+const LOOK: &str = include_str!("../../../../shaders/mixed/look.wgsl");
+const POINT_EDGES: &str = include_str!("../../../../shaders/mixed/point_edges.wgsl");
 const MIXED_LATTICE: &str = include_str!("../../../../shaders/mixed/lattice.wgsl");
 const MIXED_POINTS: &str = include_str!("../../../../shaders/mixed/points.wgsl");
 const HULL: &str = include_str!("../../../../shaders/surface/hull.wgsl");
@@ -65,6 +69,7 @@ impl Kernel {
             Self::Paint => "paint",
             Self::Shade => "shade",
             Self::Breaks => "breaks",
+            Self::Thin => "thin",
             Self::MixedPixels => "mixed_pixels",
             Self::MixedColor => "mixed_color",
             Self::Holes => "holes",
@@ -107,16 +112,17 @@ impl Kernel {
         let emit = |target: SampleTarget, by_size: &str| match target {
             SampleTarget::Visibility => [SAMPLES, EMIT, by_size].concat(),
             SampleTarget::Layer => [SAMPLES, PEEL_STATE, EMIT_LAYER, by_size].concat(),
-            SampleTarget::Points => [MIXED_PLACE, MIXED_LATTICE, MIXED_POINTS].concat(),
+            SampleTarget::Points => [MIXED_PLACE, MIXED_LATTICE, POINT_EDGES, MIXED_POINTS].concat(),
         };
         match self {
             Self::Transform => include_str!("../../../../shaders/geometry/transform.wgsl").to_owned(),
             Self::Visibility { write, target } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility.wgsl");
-                [TRIANGLE, CORNERS, WORK, keep_nearest(write), &emit(target, SMALL), kernel].concat()
+                [TRIANGLE, CORNERS, CULLING, WORK, keep_nearest(write), &emit(target, SMALL), kernel].concat()
             }
             Self::Clip => {
-                [TRIANGLE, CORNERS, WORK, PLANES, include_str!("../../../../shaders/geometry/clip.wgsl")].concat()
+                [TRIANGLE, CORNERS, CULLING, WORK, PLANES, include_str!("../../../../shaders/geometry/clip.wgsl")]
+                    .concat()
             }
             Self::VisibilityTile { write, target } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility_tile.wgsl");
@@ -126,7 +132,7 @@ impl Kernel {
             Self::Gather => [PLACE, include_str!("../../../../shaders/occlusion/gather.wgsl")].concat(),
             Self::VisibilityFew { write } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility_few.wgsl");
-                [TRIANGLE, CORNERS, SAMPLES, keep_nearest(write), EMIT, TILE_SAMPLES, TILE, kernel].concat()
+                [TRIANGLE, CORNERS, CULLING, SAMPLES, keep_nearest(write), EMIT, TILE_SAMPLES, TILE, kernel].concat()
             }
             Self::Paint => [
                 &[TRIANGLE],
@@ -150,11 +156,14 @@ impl Kernel {
             .concat()
             .concat(),
             Self::Breaks => {
-                let (look, kernel) = (
-                    include_str!("../../../../shaders/mixed/look.wgsl"),
-                    include_str!("../../../../shaders/mixed/breaks.wgsl"),
-                );
-                [&[TRIANGLE], SHADE, &[HULL, MIXED_PLACE, look, kernel]].concat().concat()
+                let kernel = include_str!("../../../../shaders/mixed/breaks.wgsl");
+                [&[TRIANGLE], SHADE, &[HULL, MIXED_PLACE, LOOK, SEEN_FACES, kernel]].concat().concat()
+            }
+            Self::Thin => {
+                let kernel = include_str!("../../../../shaders/mixed/thin.wgsl");
+                [&[TRIANGLE], SHADE, &[HULL, CULLING, MIXED_PLACE, LOOK, SEEN_FACES, POINT_EDGES, kernel]]
+                    .concat()
+                    .concat()
             }
             Self::MixedPixels => [MIXED_PLACE, include_str!("../../../../shaders/mixed/mixed_pixels.wgsl")].concat(),
             Self::MixedColor => {
@@ -205,6 +214,7 @@ impl Kernel {
             Self::Visibility { target: SampleTarget::Points, .. } => key::PASS_MASKS,
             Self::VisibilityTile { target: SampleTarget::Points, .. } => 0,
             Self::Breaks => SHADED,
+            Self::Thin => SHADED | key::PASS_MASKS,
             Self::MixedPixels => 0,
             Self::MixedColor => SHADED | key::OCCLUSION | key::LINES,
             Self::VisibilityFew { .. } => key::SAMPLES | key::PASS_MASKS | key::GANG,

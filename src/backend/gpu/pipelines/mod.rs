@@ -46,6 +46,8 @@ pub enum Kernel {
     Shade,
     /// Samples to the places where colours break off.
     Breaks,
+    /// Triangles to the pixels that show them, though no sample need see them.
+    Thin,
     /// Those places to mixed pixels.
     MixedPixels,
     /// Points of mixed pixels to colours.
@@ -224,7 +226,7 @@ impl Kernel {
             Self::Transform => DrawStage::Transform,
             Self::Visibility { target: SampleTarget::Points, .. }
             | Self::VisibilityTile { target: SampleTarget::Points, .. } => DrawStage::Mixed,
-            Self::Breaks | Self::MixedPixels | Self::MixedColor => DrawStage::Mixed,
+            Self::Breaks | Self::Thin | Self::MixedPixels | Self::MixedColor => DrawStage::Mixed,
             Self::Visibility { .. } | Self::Clip | Self::VisibilityTile { .. } | Self::VisibilityFew { .. } => {
                 DrawStage::Visibility
             }

@@ -327,6 +327,12 @@ impl Schedule {
             self.steps.push(Step::ClearPoints);
         }
         self.dispatch(device, Kernel::Breaks, around, Batch { count: around, ..pixels })?;
+        for Pass { ids, faces, pass_bit, .. } in Pass::of_visibility(plan).into_iter().flatten() {
+            let count = ids.end - ids.start;
+            let batch =
+                Batch { first: ids.start, count, faces: faces_code(faces), pass_bit: u32::from(pass_bit), ..pixels };
+            self.dispatch(device, Kernel::Thin, count, batch)?;
+        }
         self.dispatch(device, Kernel::MixedPixels, pixels.count, pixels)?;
         let slots = self.banding.slots(plan);
         let (queued, pixels_each) = if device.loops_are_limited { (1, 1) } else { (ROUNDS_QUEUED, PIXELS_EACH) };

@@ -7,15 +7,16 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use super::BASELINE;
-use super::techniques::Technique;
+use super::techniques::Family;
 
 /// Kinds of back-ends, and which of the measured ones stand for them.
 const KINDS: [(&str, &str); 2] = [("cpu", "cpu-1"), ("gpu", "gpu")];
 
 /// From the document that `json.rs` writes, so that a table can be made without measuring again.
 pub fn table(document: &Value) -> String {
-    // Textures are filtered in one way: no technique among which to choose.
-    let is_choice = |row: &&Value| row["technique"] != Technique::Texture.name();
+    // What a request may choose among: textures are filtered in one way, and whole pictures are made of several techniques.
+    let choices = [Family::Wires, Family::Outlines, Family::Faces].map(Family::techniques).concat();
+    let is_choice = |row: &&Value| choices.iter().any(|technique| row["technique"] == technique.name());
     let rows: Vec<&Value> = document["rows"].as_array().expect("rows").iter().filter(is_choice).collect();
     let megapixels = document["size_px"].as_f64().expect("size_px").powi(2) / 1e6;
     let kilotriangles = |scene: &Value| {

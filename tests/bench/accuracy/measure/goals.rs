@@ -2,12 +2,12 @@
 
 use std::fmt::Write;
 
-use meshsnap::spec::WireMethod;
+use meshsnap::spec::{Samples, WireMethod};
 
 use super::summary::{lead, point, range};
 use super::table::{Machine, method};
 use super::techniques::{Family, Technique};
-use super::{BASELINE_SAMPLES, Effort, Row, SAMPLES};
+use super::{BASELINE_SAMPLES, Effort, Row, SAMPLES, WHOLE_SAMPLES};
 
 /// A measure, its goal and who measures it.
 struct Goal {
@@ -26,7 +26,7 @@ enum By {
     Suite(&'static str),
 }
 
-const GOALS: [Goal; 11] = [
+const GOALS: [Goal; 13] = [
     Goal {
         number: 1,
         measure: "isolated exact lines, 0.25 to 16 px wide, all angles, 64 places within a pixel",
@@ -83,6 +83,18 @@ const GOALS: [Goal; 11] = [
         by: By::Bench(leads),
     },
     Goal {
+        number: 11,
+        measure: "pictures of faces, adaptive samples; mixed pixels show several faces, or a face and the background",
+        goal: "mixed pixels RMSE <= 1.5/255, largest <= 16/255; whole pictures RMSE <= 0.5/255",
+        by: By::Suite("accuracy::adaptive"),
+    },
+    Goal {
+        number: 12,
+        measure: "faces thinner than the distance of samples, adaptive samples: hairs, slivers, needles",
+        goal: "ink 0.98 to 1.02",
+        by: By::Suite("accuracy::adaptive::hairs"),
+    },
+    Goal {
         number: 13,
         measure: "textures at a slant against the mean over each pixel",
         goal: "at most a third of trilinear filtering's error",
@@ -111,11 +123,43 @@ pub fn page(rows: &[Row], machine: &Machine, effort: Effort, before: &str) -> St
     machine.warning().iter().for_each(|warning| {
         let _ = writeln!(text, "{warning}\n");
     });
-    text.push_str("## Run time against error\n\n![Run time against error](work-precision.svg)\n\n");
+    whole(&mut text, rows);
+    text.push_str("## Techniques\n\n![Run time against error, by technique](work-precision.svg)\n\n");
     sentences(rows).iter().for_each(|sentence| {
         let _ = writeln!(text, "{sentence}");
     });
     text
+}
+
+/// The section of whole pictures: a plot, and the same as numbers.
+fn whole(text: &mut String, rows: &[Row]) {
+    text.push_str(
+        "## Whole pictures: run time against error\n\n![Run time against error, of whole pictures](whole-pictures.svg)\n\nAll pixels count, as \
+         users see them: RMSE of encoded colour, /255, where picture or truth differ from the background. Each cell is a geometric mean over the \
+         scenes: the error, and the time as a ratio to that of 4 samples. 64 samples are 16 in a picture of twice the columns and \
+         rows, scaled down.\n\n| picture | back-end |",
+    );
+    WHOLE_SAMPLES.iter().for_each(|samples| {
+        let _ = write!(text, " {samples} |");
+    });
+    let _ = writeln!(text, "\n|---|---|{}", "---|".repeat(WHOLE_SAMPLES.len()));
+    for family in [Family::Whole, Family::WholeTextures] {
+        for (&technique, (id, name)) in family.techniques().iter().flat_map(|t| BACK_ENDS.map(|back_end| (t, back_end)))
+        {
+            let at = |samples| point(rows, family, technique, id, samples);
+            let Some(usual) = at(BASELINE_SAMPLES) else { continue };
+            let _ = write!(text, "| {} | {name} |", technique.name());
+            for &samples in WHOLE_SAMPLES {
+                let cell = at(samples).map_or_else(
+                    || "16 instead".to_owned(),
+                    |p| format!("{:.2} in {:.2}", p.error, p.time / usual.time),
+                );
+                let _ = write!(text, " {cell} |");
+            }
+            text.push('\n');
+        }
+    }
+    text.push('\n');
 }
 
 /// The measurement that the page states for a goal.
@@ -177,7 +221,7 @@ fn leads(rows: &[Row]) -> String {
 
 /// Six sentences that explain the plot with the numbers of these rows.
 pub fn sentences(rows: &[Row]) -> [String; 6] {
-    let at = |technique, samples| point(rows, Family::Wires, technique, "cpu-1", samples);
+    let at = |technique, samples: Samples| point(rows, Family::Wires, technique, "cpu-1", samples);
     let least = SAMPLES[0];
     let [exact_1, exact, fwidth_1, fwidth] = [
         at(Technique::Wire(WireMethod::Exact), least),

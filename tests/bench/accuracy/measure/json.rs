@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use meshsnap::spec::Samples;
 use serde_json::{Value, json};
 
 use super::scenes::Scene;
@@ -45,7 +46,10 @@ fn row(row: &Row) -> Value {
         "scene": row.scene,
         "technique": row.technique.name(),
         "backend": row.back_end,
-        "samples": row.samples,
+        "samples": match row.samples {
+            Samples::Fixed(samples) => json!(samples),
+            Samples::Adaptive => json!(row.samples.to_string()),
+        },
         "thickness": short(row.thickness),
         "median_ms": short(row.median_ms),
         "time_ratio": short(row.time_ratio),
@@ -77,11 +81,13 @@ fn schema() -> Value {
         "size_px": "columns and rows of every picture",
         "runs": "timed rounds",
         "scenes[].family": "wires and outlines: errors of coverage, in linear light; faces: of encoded colour where a pixel shows one face \
-                            alone; pictures: of encoded colour in all pixels; textures: of encoded colour where a pixel shows one face alone",
+                            alone; pictures, whole pictures, whole textured pictures: of encoded colour in all pixels; textures: of encoded colour where a pixel \
+                            shows one face alone",
         "scenes[].triangles": "after triangulation",
-        "rows[].technique": "wire.method, outline.method or surface.normals of the request; texture: filtering, without light",
+        "rows[].technique": "wire.method, outline.method or surface.normals of the request; texture: filtering, without light; of whole pictures: what \
+                             is drawn",
         "rows[].backend": "cpu-N with N threads, or gpu",
-        "rows[].samples": "image.samples",
+        "rows[].samples": "image.samples; 64: 16 in a picture of twice the columns and rows, scaled down",
         "rows[].thickness": "wire.thickness or outline.thickness (px), chosen so that the technique is nominally as wide as the truth",
         "rows[].median_ms": "median time of Renderer::draw",
         "rows[].time_ratio": "median_ms over that of the baseline",

@@ -23,9 +23,21 @@ use std::sync::Arc;
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::{Gpu, GpuRenderer};
+use meshsnap::spec::Samples;
 
-/// Visibility samples a pixel.
-pub const SAMPLES: &[u32] = &[1, 4, 8, 16];
+/// Visibility samples a pixel, and adaptive ones where a picture can have them.
+pub const SAMPLES: &[Samples] =
+    &[Samples::Fixed(1), Samples::Fixed(4), Samples::Fixed(8), Samples::Fixed(16), Samples::Adaptive];
+
+/// Those of whole pictures. 64 are 16 in a picture of twice the columns and rows, scaled down.
+pub const WHOLE_SAMPLES: &[Samples] = &[
+    Samples::Fixed(1),
+    Samples::Fixed(4),
+    Samples::Fixed(8),
+    Samples::Fixed(16),
+    Samples::Fixed(64),
+    Samples::Adaptive,
+];
 
 /// Threads of the CPU's renderers; the first is the baseline's.
 const THREADS: [usize; 2] = [1, 2];
@@ -33,7 +45,7 @@ const THREADS: [usize; 2] = [1, 2];
 /// The baseline of all times: on the same scene's mesh, in the same rounds.
 pub const BASELINE: &str = "cpu-1, exact wires, 4 samples";
 /// The baseline's samples.
-pub const BASELINE_SAMPLES: u32 = 4;
+pub const BASELINE_SAMPLES: Samples = Samples::Fixed(4);
 
 /// A renderer that is measured.
 pub struct BackEnd {
@@ -76,7 +88,7 @@ pub struct Row {
     pub triangles: usize,
     pub technique: techniques::Technique,
     pub back_end: &'static str,
-    pub samples: u32,
+    pub samples: Samples,
     /// The requested `wire.thickness` or `outline.thickness`; 0 for faces.
     pub thickness: f64,
     pub median_ms: f64,

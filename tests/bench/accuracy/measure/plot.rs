@@ -3,46 +3,70 @@
 
 use std::fmt::Write;
 
-use super::summary::{Series, series};
+use super::summary::{Point, Series, series};
 use super::table::Machine;
 use super::techniques::{Family, Technique};
 use super::{BASELINE, Row};
+use meshsnap::spec::Samples;
 
 const SIZE: [f64; 2] = [720.0, 430.0];
 /// Top and bottom of the plots; the legend is below.
 const HEIGHT: [f64; 2] = [44.0, 316.0];
 
 /// A plot of some families, with its own range of times and its own legend.
-struct Panel {
+pub struct Panel {
     title: &'static str,
     families: &'static [Family],
-    /// Left and right.
-    x: [f64; 2],
+    /// Those of the families' techniques that it shows.
+    shows: fn(Technique) -> bool,
 }
 
-const PANELS: [Panel; 2] = [
-    Panel { title: "wires", families: &[Family::Wires], x: [58.0, 372.0] },
+/// Left and right of the panels.
+const PLACES: [[f64; 2]; 2] = [[58.0, 372.0], [410.0, 704.0]];
+
+/// Techniques by themselves.
+pub const TECHNIQUES: [Panel; 2] = [
+    Panel { title: "wires", families: &[Family::Wires], shows: |_| true },
     Panel {
         title: "outlines, flat faces, textures",
         families: &[Family::Outlines, Family::Faces, Family::Textures],
-        x: [410.0, 704.0],
+        shows: |_| true,
+    },
+];
+
+/// Pictures as users ask for them.
+pub const WHOLE: [Panel; 2] = [
+    Panel {
+        title: "faces",
+        families: &[Family::Whole, Family::WholeTextures],
+        shows: |t| !matches!(t, Technique::WiredFaces | Technique::OutlinedFaces),
+    },
+    Panel {
+        title: "lines over faces",
+        families: &[Family::Whole],
+        shows: |t| matches!(t, Technique::WiredFaces | Technique::OutlinedFaces),
     },
 ];
 
 /// Both panels share the range of errors. Colours are told apart on white and on black.
-pub fn svg(rows: &[Row], machine: &Machine) -> String {
-    let all: Vec<Vec<Series>> =
-        PANELS.iter().map(|p| p.families.iter().flat_map(|&family| series(rows, family)).collect()).collect();
+pub fn svg(rows: &[Row], machine: &Machine, panels: &[Panel; 2]) -> String {
+    let of = |panel: &Panel| -> Vec<Series> {
+        let all = panel.families.iter().flat_map(|&family| series(rows, family));
+        all.filter(|series| (panel.shows)(series.technique)).collect()
+    };
+    let all: Vec<Vec<Series>> = panels.iter().map(of).collect();
     let points = || all.iter().flatten().flat_map(|s| &s.points);
     let errors = Axis::new(points().map(|p| p.error), [HEIGHT[1], HEIGHT[0]]);
     let mut text = head(&machine.line());
-    for (panel, series) in PANELS.iter().zip(&all) {
-        let times = Axis::new(series.iter().flat_map(|s| &s.points).map(|p| p.time), panel.x);
-        frame(&mut text, panel, &times, &errors);
+    for ((panel, x), series) in panels.iter().zip(PLACES).zip(&all) {
+        let times = Axis::new(series.iter().flat_map(|s| &s.points).map(|p| p.time), x);
+        frame(&mut text, panel.title, &times, &errors);
         series.iter().for_each(|s| line(&mut text, s, &times, &errors));
-        legend(&mut text, panel, series);
+        legend(&mut text, x, series);
     }
     back_ends(&mut text, rows, machine);
+    let samples: Vec<String> = panels[0].families[0].samples().iter().map(|&s| s.to_string()).collect();
+    markers(&mut text, &samples);
     text.push_str("</svg>\n");
     text
 }
@@ -108,8 +132,8 @@ fn label(text: &mut String, [x, y]: [f64; 2], anchor: &str, words: &str) {
     let _ = writeln!(text, r#"<text class="text" x="{x:.1}" y="{y:.1}" text-anchor="{anchor}">{words}</text>"#);
 }
 
-fn frame(text: &mut String, panel: &Panel, times: &Axis, errors: &Axis) {
-    let [left, right] = panel.x;
+fn frame(text: &mut String, title: &str, times: &Axis, errors: &Axis) {
+    let [left, right] = times.ends;
     let [top, bottom] = HEIGHT;
     let mut rule = |x1: f64, y1: f64, x2: f64, y2: f64| {
         let _ = writeln!(text, r#"<path class="grid" d="M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}" fill="none"/>"#);
@@ -119,12 +143,12 @@ fn frame(text: &mut String, panel: &Panel, times: &Axis, errors: &Axis) {
     for v in times.ticks() {
         label(text, [times.at(v), bottom + 15.0], "middle", &number(v));
     }
-    if panel.x[0] == PANELS[0].x[0] {
+    if left == PLACES[0][0] {
         for v in errors.ticks() {
             label(text, [left - 5.0, errors.at(v) + 4.0], "end", &number(v));
         }
     }
-    let title = escaped(panel.title);
+    let title = escaped(title);
     let _ = writeln!(
         text,
         r#"<text class="text" x="{left}" y="{}" font-weight="600" font-size="13">{title}</text>"#,
@@ -134,7 +158,10 @@ fn frame(text: &mut String, panel: &Panel, times: &Axis, errors: &Axis) {
 
 fn line(text: &mut String, series: &Series, times: &Axis, errors: &Axis) {
     let color = color(series.technique);
-    let places: Vec<[f64; 2]> = series.points.iter().map(|p| [times.at(p.time), errors.at(p.error)]).collect();
+    let place = |p: &Point| [times.at(p.time), errors.at(p.error)];
+    let (adaptive, fixed): (Vec<&Point>, Vec<&Point>) =
+        series.points.iter().partition(|p| p.samples == Samples::Adaptive);
+    let places: Vec<[f64; 2]> = fixed.into_iter().map(place).collect();
     let path: Vec<String> = places.iter().map(|[x, y]| format!("{x:.1} {y:.1}")).collect();
     let _ = writeln!(
         text,
@@ -146,6 +173,16 @@ fn line(text: &mut String, series: &Series, times: &Axis, errors: &Axis) {
     for (i, place) in places.into_iter().enumerate() {
         marker(text, series.back_end, color, place, 3.0 + 1.5 * i as f64);
     }
+    for place in adaptive.into_iter().map(place) {
+        ring(text, color, place);
+        marker(text, series.back_end, color, place, 3.0);
+    }
+}
+
+/// What marks adaptive samples.
+fn ring(text: &mut String, color: &str, [x, y]: [f64; 2]) {
+    let _ =
+        writeln!(text, r#"<circle cx="{x:.1}" cy="{y:.1}" r="8" fill="none" stroke="{color}" stroke-width="1.8"/>"#);
 }
 
 fn marker(text: &mut String, back_end: &str, color: &str, [x, y]: [f64; 2], r: f64) {
@@ -170,16 +207,16 @@ fn marker(text: &mut String, back_end: &str, color: &str, [x, y]: [f64; 2], r: f
 }
 
 /// The techniques of a panel by colour.
-fn legend(text: &mut String, panel: &Panel, series: &[Series]) {
+fn legend(text: &mut String, [left, right]: [f64; 2], series: &[Series]) {
     let mut techniques: Vec<Technique> = series.iter().map(|s| s.technique).collect();
     techniques.dedup();
-    let mut x = panel.x[0];
+    let mut x = left;
     let mut y = HEIGHT[1] + 58.0;
     for technique in techniques {
         let words = words(technique);
         let width = 26.0 + 6.3 * words.len() as f64;
-        if x + width > panel.x[1] + 12.0 {
-            (x, y) = (panel.x[0], y + 18.0);
+        if x + width > right + 12.0 {
+            (x, y) = (left, y + 18.0);
         }
         let _ = writeln!(
             text,
@@ -195,7 +232,7 @@ fn legend(text: &mut String, panel: &Panel, series: &[Series]) {
 /// The back-ends by marker, and what the size of markers says.
 fn back_ends(text: &mut String, rows: &[Row], machine: &Machine) {
     let y = HEIGHT[1] + 100.0;
-    let mut x = PANELS[0].x[0];
+    let mut x = PLACES[0][0];
     let gpu = if machine.has_software_gpu() { "Vulkan on the CPU" } else { "GPU" };
     let known = [("cpu-1", "CPU, 1 thread"), ("cpu-2", "CPU, 2 threads"), ("gpu", gpu)];
     for (name, words) in known.into_iter().filter(|(name, _)| rows.iter().any(|row| row.back_end == *name)) {
@@ -203,9 +240,13 @@ fn back_ends(text: &mut String, rows: &[Row], machine: &Machine) {
         label(text, [x + 14.0, y], "start", words);
         x += 32.0 + 6.3 * words.len() as f64;
     }
-    let samples: Vec<String> = super::SAMPLES.iter().map(u32::to_string).collect();
-    let words = format!("larger markers: {} samples a pixel", samples.join(", "));
-    label(text, [SIZE[0] - 16.0, y], "end", &words);
+}
+
+/// The samples by size of marker, and the ring of adaptive ones, which are the last.
+fn markers(text: &mut String, samples: &[String]) {
+    let Some((_, fixed)) = samples.split_last() else { return };
+    let words = format!("larger markers: {} samples per pixel; ring: adaptive", fixed.join(", "));
+    label(text, [SIZE[0] - 16.0, HEIGHT[1] + 100.0], "end", &words);
 }
 
 fn words(technique: Technique) -> &'static str {
@@ -226,7 +267,9 @@ fn color(technique: Technique) -> &'static str {
         Technique::Hull => "#d9730d",
         Technique::FaceNormals => "#2da15f",
         Technique::DerivativeNormals => "#c545a8",
-        Technique::Texture => "#a8800c",
+        Technique::Texture | Technique::TexturedFaces => "#a8800c",
+        Technique::LitFaces | Technique::WiredFaces => "#2f81f7",
+        Technique::SmoothFaces | Technique::OutlinedFaces => "#d9730d",
     }
 }
 

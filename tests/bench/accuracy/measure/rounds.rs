@@ -8,22 +8,26 @@ use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
 use meshsnap::plan::DrawPlan;
-use meshsnap::spec::WireMethod;
+use meshsnap::spec::{Samples, WireMethod};
 
 use super::scenes::{Scene, plan};
 use super::techniques::{Family, Technique};
 use super::truths::{Apart, Truth};
-use super::{BASELINE_SAMPLES, BackEnd, Effort, Row, SAMPLES};
+use super::{BASELINE_SAMPLES, BackEnd, Effort, Row};
 use crate::oracle::screen::Screen;
+use crate::oracle::surface::srgb;
 use crate::oracle::vector::length;
 
 /// A plan to draw.
 struct Case<'a> {
     technique: Technique,
-    samples: u32,
+    samples: Samples,
     thickness: f64,
     plan: DrawPlan<'a>,
 }
+
+/// Samples of pictures that are drawn with twice the columns and rows, and scaled down.
+const DOUBLED: Samples = Samples::Fixed(64);
 
 /// The results of a case's draws on one back-end.
 struct Drawn {
@@ -42,14 +46,18 @@ pub fn measure(scene: &Scene, effort: Effort, back_ends: &mut [BackEnd]) -> Vec<
     let mut cases: Vec<Case<'_>> = Vec::new();
     for &technique in scene.family.techniques() {
         let cased = |&samples| case(scene, effort, &mesh, technique, samples, wanted(technique));
-        cases.extend(SAMPLES.iter().map(cased));
+        // A picture that cannot have adaptive samples would be one of 16 once more.
+        let is_own = |case: &Case<'_>| case.samples != Samples::Adaptive || case.plan.is_adaptive;
+        cases.extend(scene.family.samples().iter().map(cased).filter(is_own));
     }
     let truths = truths(scene, effort, &mesh, &baseline, &cases);
     let (drawn, baseline_ms) = rounds(&cases, &baseline, effort.runs, back_ends);
 
     let mut rows = Vec::new();
-    let truths = truths.iter().flat_map(|truth| SAMPLES.iter().map(move |_| truth));
-    for ((case, truth), drawn) in cases.iter().zip(truths).zip(&drawn) {
+    let techniques = scene.family.techniques();
+    for (case, drawn) in cases.iter().zip(&drawn) {
+        let truth =
+            &truths[techniques.iter().position(|&own| own == case.technique).expect("a technique of the family")];
         for (i, (back_end, on)) in back_ends.iter().zip(drawn).enumerate() {
             let twin = (i > 0).then(|| Apart::of(&drawn[0].picture, &on.picture));
             let is_cpu = back_end.name.starts_with("cpu");
@@ -88,6 +96,9 @@ fn rounds(cases: &[Case<'_>], baseline: &Case<'_>, runs: usize, back_ends: &mut 
         (0..count).map(|back_end| Drawn { picture: draw(back_end, plan).0, times_ms: Vec::new() }).collect()
     };
     let mut drawn: Vec<Vec<Drawn>> = cases.iter().map(|case| warm(&case.plan)).collect();
+    for (_, drawn) in cases.iter().zip(&mut drawn).filter(|(case, _)| case.samples == DOUBLED) {
+        drawn.iter_mut().for_each(|on| on.picture = halved(&on.picture));
+    }
     let mut of_baseline = Vec::new();
     for _ in 0..runs {
         of_baseline.push(draw(0, &baseline.plan).1);
@@ -98,6 +109,19 @@ fn rounds(cases: &[Case<'_>], baseline: &Case<'_>, runs: usize, back_ends: &mut 
         }
     }
     (drawn, median(of_baseline))
+}
+
+/// An opaque picture of half the columns and rows: each pixel the mean of four, in linear light.
+fn halved(picture: &Image) -> Image {
+    let [width_px, height_px] = [picture.width_px / 2, picture.height_px / 2];
+    let mut rgba = Vec::with_capacity(picture.rgba.len() / 4);
+    for (y, x) in (0..height_px).flat_map(|y| (0..width_px).map(move |x| (y, x))) {
+        let four = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[dx, dy]| picture.pixel(2 * x + dx, 2 * y + dy));
+        let mean = |k: usize| four.iter().map(|pixel| srgb::to_linear(f64::from(pixel[k]) / 255.0)).sum::<f64>() / 4.0;
+        rgba.extend([0, 1, 2].map(|k| (255.0 * srgb::from_linear(mean(k))).round() as u8));
+        rgba.push(255);
+    }
+    Image { width_px, height_px, rgba: rgba.into() }
 }
 
 /// Exact wires of the scene's own width, or 1 px wide where it has none.
@@ -111,13 +135,14 @@ fn case<'a>(
     effort: Effort,
     mesh: &'a Mesh,
     technique: Technique,
-    samples: u32,
+    samples: Samples,
     thickness: f64,
 ) -> Case<'a> {
     // Requests carry f32.
     let thickness = f64::from(thickness as f32);
-    let spec = scene.spec(effort.size_px, &technique.keys(scene, samples, thickness));
-    Case { technique, samples, thickness, plan: plan(mesh, &spec) }
+    let (scale, asked) = if samples == DOUBLED { (2, Samples::Fixed(16)) } else { (1, samples) };
+    let keys = technique.keys(scene, asked, f64::from(scale) * thickness);
+    Case { technique, samples, thickness, plan: plan(mesh, &scene.spec(scale * effort.size_px, &keys)) }
 }
 
 /// A truth for each technique, in their order.
@@ -126,14 +151,16 @@ fn truths(scene: &Scene, effort: Effort, mesh: &Mesh, baseline: &Case<'_>, cases
         Rc::new(Truth::new(scene.family, technique, plan, scene.width_px, effort.points_per_side))
     };
     let techniques = scene.family.techniques();
+    let own = |technique| cases.iter().find(|case| case.technique == technique).expect("a case of each technique");
     match scene.family {
         Family::Wires => vec![of(Technique::Wire(WireMethod::Exact), &baseline.plan); techniques.len()],
         Family::Faces | Family::Pictures => vec![of(Technique::FaceNormals, &cases[0].plan); techniques.len()],
-        Family::Textures => vec![of(Technique::Texture, &cases[0].plan)],
+        Family::Textures | Family::WholeTextures => vec![of(techniques[0], &cases[0].plan)],
+        Family::Whole => techniques.iter().map(|&technique| of(technique, &own(technique).plan)).collect(),
         // Each in its own view: room is left for what sticks out.
         Family::Outlines => {
             let outline = |&technique: &Technique| {
-                let own = cases.iter().find(|case| case.technique == technique).expect("a case of each technique");
+                let own = own(technique);
                 let mut lines = case(scene, effort, mesh, Technique::Contour, BASELINE_SAMPLES, own.thickness).plan;
                 lines.projection = own.plan.projection;
                 of(technique, &lines)

@@ -66,6 +66,11 @@ pub const SCENES: &[Scene] = &[
     solid("rings, whole picture", Family::Pictures, Source::Made(|_| meshes::rings()), 0.0),
     quick(Scene { keys: ALONG, ..solid("floor at a slant", Family::Textures, Source::Textured(textured::floor), 0.0) }),
     solid("textured torus", Family::Textures, Source::Textured(textured::torus), 0.0),
+    quick(solid("gear", Family::Whole, Source::Made(|_| shapes::gear(14)), 1.5)),
+    solid("rings", Family::Whole, Source::Made(|_| meshes::rings()), 1.0),
+    solid("ball of 20,480", Family::Whole, Source::Made(|_| meshes::icosphere(5)), 0.5),
+    Scene { keys: ALONG, ..solid("floor", Family::WholeTextures, Source::Textured(textured::floor), 0.0) },
+    solid("torus of tiles", Family::WholeTextures, Source::Textured(textured::torus), 0.0),
 ];
 
 /// Scenes that no table is made from: what a table says of techniques must hold for these too.

@@ -1,14 +1,14 @@
 //! Rows of many scenes as one point, and what follows from them.
 
-use meshsnap::spec::WireMethod;
+use meshsnap::spec::{Samples, WireMethod};
 
+use super::Row;
 use super::techniques::{Family, Technique};
-use super::{Row, SAMPLES};
 
 /// A technique on a back-end with a number of samples: geometric means over a family's scenes.
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
-    pub samples: u32,
+    pub samples: Samples,
     /// Time as a ratio to the baseline's.
     pub time: f64,
     /// RMSE, /255.
@@ -37,7 +37,7 @@ pub fn series(rows: &[Row], family: Family) -> Vec<Series> {
         if !all.iter().any(|s| s.technique == row.technique && s.back_end == row.back_end) {
             let (technique, back_end) = (row.technique, row.back_end);
             let of = |samples| point(rows, family, technique, back_end, samples);
-            let points = SAMPLES.iter().filter_map(|&samples| of(samples)).collect();
+            let points = family.samples().iter().filter_map(|&samples| of(samples)).collect();
             all.push(Series { family, technique, back_end, points });
         }
     }
@@ -45,7 +45,7 @@ pub fn series(rows: &[Row], family: Family) -> Vec<Series> {
 }
 
 /// The mean over the family's scenes; None where there is nothing to take a mean of.
-pub fn point(rows: &[Row], family: Family, technique: Technique, back_end: &str, samples: u32) -> Option<Point> {
+pub fn point(rows: &[Row], family: Family, technique: Technique, back_end: &str, samples: Samples) -> Option<Point> {
     let is_of =
         |row: &&Row| (row.family, row.technique, row.back_end, row.samples) == (family, technique, back_end, samples);
     let chosen: Vec<&Row> = rows.iter().filter(is_of).collect();

@@ -14,9 +14,10 @@
 
 use std::sync::LazyLock;
 
-use meshsnap::spec::{ThicknessUnit, WIRE_METHODS, WireMethod};
+use meshsnap::spec::{Samples, ThicknessUnit, WIRE_METHODS, WireMethod};
 
 use super::scenes::Scene;
+use super::{SAMPLES, WHOLE_SAMPLES};
 
 /// Scenes whose techniques can be compared with each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -29,6 +30,10 @@ pub enum Family {
     Faces,
     /// The same, of all pixels, so that anti-aliasing counts.
     Pictures,
+    /// Pictures as users ask for them. Error: of colour, in all pixels.
+    Whole,
+    /// The same of textured faces without light.
+    WholeTextures,
     /// Textured faces without light. Error: of colour, where a pixel shows one face alone.
     Textures,
 }
@@ -42,9 +47,31 @@ pub enum Technique {
     FaceNormals,
     DerivativeNormals,
     Texture,
+    /// Faces lit by their own normals.
+    LitFaces,
+    /// Faces lit by normals between corners.
+    SmoothFaces,
+    /// Lit faces under exact wires.
+    WiredFaces,
+    /// Lit faces under a contour.
+    OutlinedFaces,
+    /// Texture and background.
+    TexturedFaces,
 }
 
-use Technique::{Contour, DerivativeNormals, FaceNormals, Hull, Texture, Wire};
+use Technique::{
+    Contour, DerivativeNormals, FaceNormals, Hull, LitFaces, OutlinedFaces, SmoothFaces, Texture, TexturedFaces, Wire,
+    WiredFaces,
+};
+
+/// Whole pictures, but for how normals are found.
+const LIT: &[(&str, &str)] = &[
+    ("light.preset", "three-point"),
+    ("light.ambient_occlusion", "0"),
+    ("surface.metallic", "0"),
+    ("surface.color", "c08040"),
+    ("background", "fff"),
+];
 
 static WIRES: LazyLock<Vec<Technique>> = LazyLock::new(|| WIRE_METHODS.iter().map(|row| Wire(row.method)).collect());
 
@@ -55,6 +82,16 @@ impl Family {
             Self::Outlines => &[Contour, Hull],
             Self::Faces | Self::Pictures => &[FaceNormals, DerivativeNormals],
             Self::Textures => &[Texture],
+            Self::Whole => &[LitFaces, SmoothFaces, WiredFaces, OutlinedFaces],
+            Self::WholeTextures => &[TexturedFaces],
+        }
+    }
+
+    /// The samples that are compared.
+    pub fn samples(self) -> &'static [Samples] {
+        match self {
+            Self::Whole | Self::WholeTextures => WHOLE_SAMPLES,
+            _ => SAMPLES,
         }
     }
 
@@ -65,6 +102,8 @@ impl Family {
             Self::Faces => "faces",
             Self::Pictures => "pictures",
             Self::Textures => "textures",
+            Self::Whole => "whole pictures",
+            Self::WholeTextures => "whole textured pictures",
         }
     }
 }
@@ -79,6 +118,11 @@ impl Technique {
             FaceNormals => "face",
             DerivativeNormals => "derivative",
             Texture => "texture",
+            LitFaces => "lit faces",
+            SmoothFaces => "smooth faces",
+            WiredFaces => "wires over faces",
+            OutlinedFaces => "contour over faces",
+            TexturedFaces => "textured faces",
         }
     }
 
@@ -87,7 +131,7 @@ impl Technique {
     pub fn thickness(self, width_px: f64, height_px: f64) -> f64 {
         let unit = if let Wire(method) = self { method.info().unit } else { ThicknessUnit::Pixels };
         match (self, unit) {
-            (FaceNormals | DerivativeNormals | Texture, _) => 0.0,
+            (FaceNormals | DerivativeNormals | Texture | LitFaces | SmoothFaces | TexturedFaces, _) => 0.0,
             (_, ThicknessUnit::Pixels) => width_px,
             (_, ThicknessUnit::Derivatives) => 0.5 * (width_px - width_px.min(1.0)),
             // Both triangles of an edge draw the wire.
@@ -97,7 +141,7 @@ impl Technique {
 
     /// A request's keys. Lines are opaque white on nothing, so that alpha is coverage. A hull needs
     /// a surface before it, so it is white on a black one.
-    pub fn keys(self, scene: &Scene, samples: u32, thickness: f64) -> Vec<(&'static str, String)> {
+    pub fn keys(self, scene: &Scene, samples: Samples, thickness: f64) -> Vec<(&'static str, String)> {
         let mut keys: Vec<(&str, &str)> = match self {
             Wire(_) => vec![
                 ("style", "wireframe"),
@@ -116,8 +160,25 @@ impl Technique {
                 ("surface.color", "c08040"),
                 ("background", "fff"),
             ],
-            Texture => vec![("style", "unlit"), ("background", "fff")],
+            Texture | TexturedFaces => vec![("style", "unlit"), ("background", "fff")],
+            LitFaces | WiredFaces | OutlinedFaces => [&[("style", "flat")], LIT].concat(),
+            SmoothFaces => [&[("style", "smooth")], LIT].concat(),
         };
+        match self {
+            WiredFaces => keys.extend([
+                ("wire.method", "exact"),
+                ("wire.hidden", "hide"),
+                ("wire.edges", "triangles"),
+                ("wire.color", "001133"),
+            ]),
+            OutlinedFaces => keys.extend([
+                ("outline.method", "contour"),
+                ("outline.unit", "px"),
+                ("outline.color", "001133"),
+                ("outline.min_length", "0"),
+            ]),
+            _ => {}
+        }
         if matches!(self, Contour | Hull) {
             keys.extend([("outline.method", self.name()), ("outline.unit", "px"), ("outline.color", "fff")]);
             // The truth has the short chains, too.
@@ -134,8 +195,9 @@ impl Technique {
                     keys.push(("wire.smoothing", scene.width_px.min(1.0).to_string()));
                 }
             }
-            Contour | Hull => keys.push(("outline.thickness", thickness.to_string())),
-            FaceNormals | DerivativeNormals | Texture => {}
+            Contour | Hull | OutlinedFaces => keys.push(("outline.thickness", thickness.to_string())),
+            WiredFaces => keys.push(("wire.thickness", thickness.to_string())),
+            FaceNormals | DerivativeNormals | Texture | LitFaces | SmoothFaces | TexturedFaces => {}
         }
         keys.push(("samples", samples.to_string()));
         keys

@@ -8,6 +8,7 @@ use meshsnap::plan::DrawPlan;
 use serde_json::json;
 
 use crate::oracle::screen::Screen;
+use crate::oracle::surface::rays::{Pen, picture};
 use crate::oracle::surface::srgb;
 use crate::oracle::surface::texture::Grey;
 use crate::oracle::vector::{V2, V3};
@@ -63,6 +64,23 @@ pub fn pixels(plan: &DrawPlan<'_>, points: u32) -> (Vec<Vec<f64>>, Vec<bool>) {
     let colors: Vec<Option<f64>> = places.map(color).collect();
     let encoded = |color: &Option<f64>| vec![color.map_or(1.0, srgb::from_linear); 3];
     (colors.iter().map(encoded).collect(), colors.iter().map(Option::is_some).collect())
+}
+
+/// Linear colours of all pixels over white, each the mean over `points` squared places.
+pub fn whole(plan: &DrawPlan<'_>, points: u32) -> Vec<V3> {
+    let scene = scene(plan);
+    let texture = Grey::new(SIDE, &tiles());
+    let uvs = plan.surface.as_ref().and_then(|surface| surface.uvs.as_ref()).expect("texture coordinates");
+    let value = |triangle: u32, point: V2| {
+        let corners = scene.triangles[triangle as usize].map(|v| {
+            let [x, y, _, w] = scene.camera.homogeneous(scene.positions[v as usize]);
+            [x, y, w]
+        });
+        let uvs = uvs.triangles[triangle as usize].map(|v| uvs.values[v as usize].map(f64::from));
+        [texture.at(place(&corners, &uvs, point)); 3]
+    };
+    let pen = Pen { segments: &[], width: 0.0, color: [0.0; 3] };
+    picture(&Screen::new(&scene), &pen, [1.0; 3], points, value)
 }
 
 /// Texture coordinates at a point of the picture: the shares of the corners, whose homogeneous places are known, make

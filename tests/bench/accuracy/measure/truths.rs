@@ -9,10 +9,9 @@ use crate::oracle::flip::Seen;
 use crate::oracle::lines::coverage::ink;
 use crate::oracle::screen::{Screen, is_front};
 use crate::oracle::surface::light::{face_normal, lit};
-use crate::oracle::surface::rays::{Pen, picture};
 use crate::oracle::vector::{V3, sub};
 use crate::oracle::{lines::silhouette, surface::srgb};
-use crate::support::seen::{lights, material, only_triangle, scene, segments};
+use crate::support::seen::{lights, material, only_triangle, scene, segments, whole_picture};
 
 /// A picture as it should be.
 pub struct Truth {
@@ -75,7 +74,11 @@ impl Truth {
                 let (pixels, counts) = textured::pixels(lines, points);
                 (Kind::Color, pixels, Some(counts))
             }
-            (Family::Pictures, _) => (Kind::Color, whole_picture(lines, points), None),
+            (Family::Pictures | Family::Whole, _) => {
+                let linear = whole_picture(lines, technique == Technique::SmoothFaces, points);
+                (Kind::Color, encoded(linear), None)
+            }
+            (Family::WholeTextures, _) => (Kind::Color, encoded(textured::whole(lines, points)), None),
             (_, Technique::Hull) => {
                 let scene = scene(lines);
                 let screen = Screen::new(&scene);
@@ -167,13 +170,8 @@ fn whole_pixels(plan: &DrawPlan<'_>) -> (Vec<Vec<f64>>, Option<Vec<bool>>) {
     (faces.iter().map(color).collect(), Some(faces.iter().map(Option::is_some).collect()))
 }
 
-/// Encoded colours of all pixels over white.
-fn whole_picture(plan: &DrawPlan<'_>, points: u32) -> Vec<Vec<f64>> {
-    let colors = face_colors(plan);
-    let screen = Screen::new(&scene(plan));
-    let pen = Pen { segments: &[], width: 0.0, color: [0.0; 3] };
-    let linear = picture(&screen, &pen, [1.0; 3], points, |triangle, _| colors[triangle as usize]);
-    linear.into_iter().map(|c| c.map(srgb::from_linear).to_vec()).collect()
+fn encoded(linear: Vec<V3>) -> Vec<Vec<f64>> {
+    linear.into_iter().map(|color| color.map(srgb::from_linear).to_vec()).collect()
 }
 
 /// The exact linear colour of each flat face, on the viewer's side.

@@ -1,18 +1,19 @@
 //! The accuracy of whole pictures of faces, and of their mixed pixels, with adaptive samples: against the
 //! oracle's points, in encoded colours.
 
+pub mod hairs;
+
 use meshsnap::backend::Renderer;
 use meshsnap::limits::Deadline;
 use meshsnap::plan::DrawPlan;
 
 use crate::measure::meshes;
-use crate::oracle::screen::{Scene, Screen};
-use crate::oracle::surface::light::{face_normal, lit, smooth_normals, weights};
-use crate::oracle::surface::rays::{Pen, picture, shares};
+use crate::oracle::screen::Screen;
+use crate::oracle::surface::rays::shares;
 use crate::oracle::surface::srgb;
-use crate::oracle::vector::{V2, V3, cross, dot, unit};
-use crate::support::seen::{lights, material};
-use crate::support::truth::{Errors, Gate, cases, goal, points_per_side, renderers, scene, segments};
+use crate::oracle::vector::V3;
+use crate::support::seen::whole_picture;
+use crate::support::truth::{Errors, Gate, cases, goal, points_per_side, renderers, scene};
 use crate::support::{scenes, shapes};
 
 /// Goal: pixels that show several faces, or a face and the background.
@@ -61,18 +62,8 @@ struct Truth {
 
 impl Truth {
     fn of(plan: &DrawPlan<'_>, is_smooth: bool) -> Self {
-        let scene = scene(plan);
-        let screen = Screen::new(&scene);
-        let normals = corner_normals(&scene, is_smooth);
-        let (material, lights) = (material(plan.surface.as_ref().unwrap()), lights(plan));
-        let shade = |triangle: u32, p: V2| lit(&material, &lights, normal_at(&scene, &normals, triangle, p));
-        let background = [0, 1, 2].map(|k| f64::from(plan.background[k]));
-        let pass = plan.lines.first();
-        let segments = pass.map_or_else(Vec::new, |_| segments(plan));
-        let line = pass.map_or([0.0; 3], |pass| [0, 1, 2].map(|k| f64::from(pass.color[k])));
-        let width = pass.map_or(0.0, |pass| f64::from(pass.width_px));
-        let pen = Pen { segments: &segments, width, color: line };
-        let colors = picture(&screen, &pen, background, points_per_side(), shade);
+        let screen = Screen::new(&scene(plan));
+        let colors = whole_picture(plan, is_smooth, points_per_side());
         let size = [plan.width_px, plan.height_px];
         let is_mixed = |i: usize| {
             let shares = shares(&screen, [i as u32 % size[0], i as u32 / size[0]], TOLD_BY);
@@ -92,25 +83,6 @@ impl Truth {
         };
         [errors(&|i| self.is_mixed[i]), errors(&|_| true)]
     }
-}
-
-/// Exact normals by corner of each triangle.
-fn corner_normals(scene: &Scene, is_smooth: bool) -> Vec<[V3; 3]> {
-    if is_smooth {
-        return smooth_normals(&scene.positions, &scene.triangles, 30.0);
-    }
-    let flat = |t: &[u32; 3]| [face_normal(t.map(|v| scene.positions[v as usize])).unwrap_or([0.0, 0.0, 1.0]); 3];
-    scene.triangles.iter().map(flat).collect()
-}
-
-/// The unit normal on the viewer's side at a point of a triangle.
-fn normal_at(scene: &Scene, normals: &[[V3; 3]], triangle: u32, p: V2) -> V3 {
-    let corners = scene.triangles[triangle as usize].map(|v| scene.camera.homogeneous(scene.positions[v as usize]));
-    let [a, b, c] = corners.map(|h| [h[0], h[1], h[3]]);
-    let side = if dot(a, cross(b, c)) < 0.0 { 1.0 } else { -1.0 };
-    let share = weights(corners, p);
-    let of = |k: usize| side * (0..3).map(|i| share[i] * normals[triangle as usize][i][k]).sum::<f64>();
-    unit([of(0), of(1), of(2)])
 }
 
 fn plan_of<'a>(mesh: &'a meshsnap::mesh::Mesh, (name, _, style, light): &Case) -> DrawPlan<'a> {

@@ -11,6 +11,7 @@ use crate::backend::cpu::geometry::batch_avx2::{Corners, bits, load, pixels, to_
 use crate::backend::cpu::geometry::setups::EXTENT_MAX;
 use crate::backend::cpu::geometry::transform::OUTSIDE;
 use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::mixed::thinness::is_thin;
 
 /// By bits of lanes: these lanes first, in their order, a byte each.
 static ORDERS: [u64; 256] = orders();
@@ -49,7 +50,8 @@ pub fn keep(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass, t
             padded[..group.len()].copy_from_slice(group);
             &padded
         });
-        let lanes = Lanes::new(&load(context.vertices, triangles), bounds);
+        let corners = load(context.vertices, triangles);
+        let lanes = Lanes::new(&corners, bounds);
         let drawn = pass.drawn(context.plan, first, group.len());
         let whole = !lanes.outside & ((1 << group.len()) - 1);
         kept.sides.push(Sides { front: (lanes.front & whole) as u8, back: (lanes.back & whole) as u8 });
@@ -61,12 +63,32 @@ pub fn keep(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass, t
             lanes.put_boxed(first, back, &mut kept.backs);
             lanes.put(first, back, &mut kept.backs);
         }
+        if bounds.needs_thin && front | back != 0 {
+            let thin = thin(&corners, front | back);
+            if thin != 0 {
+                lanes.put(first, thin, &mut kept.thin);
+            }
+        }
         let outside = lanes.outside & (drawn[0] | drawn[1]);
         if outside != 0 {
             kept.outside.extend((0..LANES).filter(|l| outside >> l & 1 != 0).map(|l| (first + l) as u32));
         }
     }
     kept
+}
+
+/// Bits of the lanes, of some, whose triangles are thin.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn thin(corners: &Corners, lanes: u32) -> u32 {
+    let ints = |v: [__m256i; 3]| [to_ints(v[0]), to_ints(v[1]), to_ints(v[2])];
+    let (x, y) = (ints(corners.x), ints(corners.y));
+    let mut thin = 0;
+    for l in 0..LANES {
+        let [x, y] = [x, y].map(|axis| [axis[0][l], axis[1][l], axis[2][l]]);
+        thin |= u32::from(is_thin(x, y, area_of(x, y))) << l;
+    }
+    thin & lanes
 }
 
 /// Eight triangles on screen.

@@ -13,6 +13,7 @@ use crate::backend::cpu::geometry::setups::Corners;
 use crate::backend::cpu::geometry::transform::{OUTSIDE, ScreenVertex};
 use crate::backend::cpu::isa::LANES;
 use crate::backend::cpu::mixed::points::POINT_GRID;
+use crate::backend::cpu::mixed::thinness::is_thin;
 use crate::plan::{DrawPlan, Faces, pass_mask};
 
 /// Triangles of one pass.
@@ -66,6 +67,8 @@ impl TrianglePass {
 /// The rectangle of the picture that has samples, and its bands.
 pub struct Bounds {
     pub grid: SampleGrid,
+    /// True if thin triangles are looked for.
+    pub needs_thin: bool,
     /// The picture's centre, 1/256 px from its corner.
     pub half: [i32; 2],
     /// Columns, and rows, that have samples.
@@ -82,6 +85,7 @@ impl Bounds {
     /// Those of a plan's picture.
     pub fn new(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2]) -> Self {
         Self {
+            needs_thin: plan.is_adaptive,
             grid: if plan.is_adaptive { POINT_GRID } else { SampleGrid::new(plan.samples) },
             half: [plan.width_px, plan.height_px].map(|size| size as i32 * 128),
             ranges: [plan.seen_range(plan.width_px), plan.seen_range(plan.height_px)],
@@ -125,6 +129,8 @@ pub struct Kept {
     pub fronts: KeptFaces,
     /// Triangles that face away, with boxes.
     pub backs: KeptFaces,
+    /// Those of both that are thin.
+    pub thin: KeptFaces,
     /// Triangles with a corner behind the eye or far outside the picture.
     pub outside: Vec<u32>,
     /// Of all triangles of the chunk, drawn or not.
@@ -145,6 +151,7 @@ impl Kept {
         Self {
             fronts: KeptFaces::with_room_for(triangles, false),
             backs: KeptFaces::with_room_for(triangles, true),
+            thin: KeptFaces::default(),
             outside: Vec::new(),
             sides: Vec::with_capacity(triangles.div_ceil(LANES)),
         }
@@ -190,6 +197,11 @@ fn keep_plainly(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePas
                 kept.backs.spans.push(lane.span);
                 kept.backs.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
             }
+            let is_shown = lane.area < 0 && is_drawn(0) || lane.area > 0 && is_drawn(1);
+            if bounds.needs_thin && lane.is_seen && is_shown && lane.is_thin {
+                kept.thin.ids.push(ids[l]);
+                kept.thin.spans.push(lane.span);
+            }
         }
         kept.sides.push(sides);
     }
@@ -200,6 +212,7 @@ fn keep_plainly(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePas
 struct Lane {
     is_outside: bool,
     is_seen: bool,
+    is_thin: bool,
     area: i64,
     /// As [`KeptFaces`] has it.
     span: u32,
@@ -219,6 +232,7 @@ impl Lane {
         Self {
             is_outside,
             is_seen,
+            is_thin: is_thin(x, y, area_of(x, y)),
             area: area_of(x, y),
             span: if is_seen { pair([top / bounds.rows, bottom / bounds.rows]) } else { 0 },
             boxed: BoxedFace { id: 0, columns: pair(columns), rows: pair(rows), depth_max: z[0].max(z[1]).max(z[2]) },
@@ -258,6 +272,7 @@ mod tests {
         let triangles: Vec<[u32; 3]> = (0..1499).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         let mut plan = DrawPlan::new([120, 90], &positions, &triangles, Projection::for_tests());
         (plan.samples, plan.pass_masks, plan.margin_px) = (samples, masks.into(), margin);
+        plan.is_adaptive = true;
         plan.hull = Some(HullPass::default());
         let deadline = Deadline::default();
         let pass = TrianglePass { ids: 3..triangles.len(), pass_bit: pass_mask::SURFACE, faces: Faces::Both };
@@ -266,12 +281,15 @@ mod tests {
             let mut cpu = CpuRenderer::with_isa(1, isa);
             cpu.transform(&plan, None);
             let kept = keep(&cpu.context(&plan, &deadline, &Stopwatch::default()), &bounds, &pass);
-            let [fronts, backs] = [kept.fronts, kept.backs].map(|kept| (kept.ids, kept.spans, kept.boxed));
-            (fronts, backs, kept.outside, kept.sides)
+            let [fronts, backs, thin] =
+                [kept.fronts, kept.backs, kept.thin].map(|kept| (kept.ids, kept.spans, kept.boxed));
+            (fronts, backs, kept.outside, kept.sides, thin)
         };
         let all: Vec<_> = Isa::available().into_iter().map(lists).collect();
         assert!(all.iter().all(|found| *found == all[0]), "{samples} samples, margin {margin}");
-        [all[0].0.0.len(), all[0].1.0.len(), all[0].2.len()]
+        let (fronts, backs, outside, _, thin) = &all[0];
+        assert!(thin.0.len() > 10, "{}", thin.0.len());
+        [fronts.0.len(), backs.0.len(), outside.len()]
     }
 
     #[test]

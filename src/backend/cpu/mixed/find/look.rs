@@ -184,7 +184,7 @@ fn step(context: &RasterContext<'_>, [a, b]: [u32; 2]) -> Step {
 fn step_of_linked(context: &RasterContext<'_>, a: u32, b: u32) -> Step {
     let surface = context.plan.surface.as_ref().filter(|_| are_linked(context, a, b));
     let Some(surface) = surface else { return Step::Hard };
-    if surface.material(a as usize).flags & (flags::LIT | flags::FACE_NORMALS) != flags::LIT | flags::FACE_NORMALS {
+    if surface.material(a as usize).flags & flags::FACE_NORMALS == 0 {
         return Step::None;
     }
     let front = area(&context.screen_triangle(a)) < 0;

@@ -2,12 +2,19 @@
 //!
 //! A pixel is mixed if its samples and those of its four neighbours show several faces (or a face and
 //! nothing) and colours break off from one to the next ([`Pairs::step`]). Where an edge goes through a pixel
-//! without parting its samples, it parts those of neighbours.
+//! without parting its samples, it parts those of neighbours. Pixels of thin triangles that no sample sees are mixed,
+//! too ([`thin`]).
 
-use std::ops::Range;
+pub mod look;
+pub mod thin;
 
-use super::look::{Pairs, Step};
+use std::ops::{ControlFlow, Range};
+
+use self::look::{Pairs, Step};
+use self::thin::mark_thin;
+use super::band_triangles::BandTriangles;
 use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::isa::dispatch;
 
@@ -26,6 +33,8 @@ pub struct MixedPixels {
     breaks: [Row; 3],
     /// Of one row.
     is_mixed: Vec<u8>,
+    /// By pixel of the shown rows: [`breaks::THIN`].
+    thin: Vec<u8>,
 }
 
 /// Places where colours break off from sample to sample, slightly or more.
@@ -36,6 +45,8 @@ pub mod breaks {
     pub const LEFT: u8 = 2;
     /// The same from the pixel above.
     pub const UPPER: u8 = 4;
+    /// To a thin triangle in the pixel that no sample need see.
+    pub const THIN: u8 = 8;
     /// From the bits above to those of the same places where colours break off more than slightly.
     pub const HARD: u32 = 4;
 }
@@ -79,6 +90,9 @@ impl MixedPixels {
         }
         self.is_mixed.clear();
         self.is_mixed.resize(width, 0);
+        self.thin.clear();
+        self.thin.reserve_exact(width * rows);
+        self.thin.resize(width * rows, 0);
     }
 
     /// Allocated memory, bytes.
@@ -88,11 +102,12 @@ impl MixedPixels {
             + (self.starts.capacity() + self.sums.capacity()) * size_of::<u32>()
             + self.breaks.iter().map(Row::bytes).sum::<usize>()
             + self.is_mixed.capacity()
+            + self.thin.capacity()
     }
 
     /// The [`bytes`](Self::bytes) of a band, at most.
     pub const fn bytes_of([width, rows]: [usize; 2]) -> usize {
-        let pixel = size_of::<u16>() + size_of::<bool>() + size_of::<u32>();
+        let pixel = size_of::<u16>() + size_of::<bool>() + size_of::<u32>() + size_of::<u8>();
         let corners = (width + 1) * (rows + 1) * size_of::<u32>();
         width * rows * pixel + size_of::<u32>() + corners + 3 * (width + 2) + width
     }
@@ -100,15 +115,26 @@ impl MixedPixels {
 
 dispatch! {
     /// Finds the mixed pixels of a band's shown rows.
-    pub fn find(context: &RasterContext<'_>, band: &SampleBand, mixed: &mut MixedPixels) = find_kernel
+    pub fn find(
+        context: &RasterContext<'_>,
+        triangles: &BandTriangles<'_>,
+        band: &SampleBand,
+        mixed: &mut MixedPixels,
+    ) = find_kernel
 }
 
 #[inline(always)]
-fn find_kernel(context: &RasterContext<'_>, band: &SampleBand, mixed: &mut MixedPixels) {
+fn find_kernel(context: &RasterContext<'_>, triangles: &BandTriangles<'_>, band: &SampleBand, mixed: &mut MixedPixels) {
     let [first, end] = band.shown.map(|row| row as i32);
     let width = band.size_px[0] as usize;
     mixed.reset([width, (end - first) as usize]);
     let mut pairs = Pairs::new();
+    let mut poll = DeadlinePoll::new(context.deadline);
+    // A picture whose deadline has passed is thrown away.
+    let _ = triangles.for_each_thin(|triangle| {
+        mark_thin(context, band, &triangle, &mut pairs, mixed);
+        if poll.is_expired(1) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
     for y in first..end {
         for y in y - 1..=y + 1 {
             let row = &mut mixed.breaks[y.rem_euclid(3) as usize];
@@ -117,7 +143,7 @@ fn find_kernel(context: &RasterContext<'_>, band: &SampleBand, mixed: &mut Mixed
                 find_breaks(context, band, y, &mut pairs, &mut row.values);
             }
         }
-        mixed.join(y);
+        mixed.join(y, (y - first) as usize);
         let before = mixed.columns.len();
         mixed.sums.push(0);
         for x in 0..width {
@@ -171,16 +197,17 @@ impl MixedPixels {
     }
 
     /// Marks the mixed pixels of a row: those where colours break off in the pixel, in one beside, above or below it, or
-    /// on the way from its first sample to theirs.
+    /// on the way from its first sample to theirs. `row` is its number among the shown ones.
     #[inline(always)]
-    fn join(&mut self, y: i32) {
+    fn join(&mut self, y: i32, row: usize) {
         const OWN: u8 = breaks::OWN | breaks::OWN << breaks::HARD;
         const LEFT: u8 = breaks::LEFT | breaks::LEFT << breaks::HARD;
         const UPPER: u8 = breaks::UPPER | breaks::UPPER << breaks::HARD;
         let [above, own, below] = [y - 1, y, y + 1].map(|y| &self.breaks[y.rem_euclid(3) as usize].values[..]);
+        let thin = &self.thin[row * self.is_mixed.len()..];
         for (x, out) in self.is_mixed.iter_mut().enumerate() {
             let beside = own[x] & OWN | own[x + 1] | own[x + 2] & (OWN | LEFT);
-            *out = beside | above[x + 1] & OWN | below[x + 1] & (OWN | UPPER);
+            *out = beside | above[x + 1] & OWN | below[x + 1] & (OWN | UPPER) | thin[x];
         }
     }
 }

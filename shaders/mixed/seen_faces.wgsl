@@ -1,0 +1,48 @@
+// Stage mixed: what samples see, and where colours break off from one to the next.
+
+// Low word: complement of the id. High word: depth.
+@group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
+
+// From the pixel's first sample to its others, one after the other.
+const BREAKS_OWN: u32 = 1u;
+// From the first sample of the pixel on the left to this one's.
+const BREAKS_LEFT: u32 = 2u;
+// The same from the pixel above.
+const BREAKS_UPPER: u32 = 4u;
+// To a thin triangle in the pixel that no sample need see.
+const BREAKS_THIN: u32 = 8u;
+// From the bits above to those of the same places where colours break off more than slightly.
+const BREAKS_HARD: u32 = 4u;
+
+// The bits of a step, given that of its place.
+fn breaks_of(step: u32, place: u32) -> u32 {
+    if step == STEP_NONE {
+        return 0u;
+    }
+    return select(place, place | (place << BREAKS_HARD), step == STEP_HARD);
+}
+
+// True if the visibility buffer has the pixel.
+fn is_seen(pixel: vec2<i32>) -> bool {
+    return pixel.x >= -batch.seen_margin && pixel.x < frame.width + batch.seen_margin && pixel.y >= batch.seen_first
+        && pixel.y < batch.seen_end;
+}
+
+// The triangle that sample s of a pixel shows.
+fn id_at(pixel: vec2<i32>, s: i32) -> u32 {
+    if !is_seen(pixel) {
+        return NOTHING;
+    }
+    let word = sample_at(pixel, s);
+    return select(~word.x, NOTHING, word.y == 0u);
+}
+
+// The depth of sample s of a pixel of the visibility buffer.
+fn depth_of(pixel: vec2<i32>, s: i32) -> f32 {
+    return bitcast<f32>(sample_at(pixel, s).y);
+}
+
+fn sample_at(pixel: vec2<i32>, s: i32) -> vec2<u32> {
+    let row = (pixel.y - batch.seen_first) * (frame.width + 2 * batch.seen_margin);
+    return samples[(row + pixel.x + batch.seen_margin) * sample_count() + s];
+}
