@@ -1,4 +1,4 @@
-// Stages visibility and mixed: whether a batch draws a triangle.
+// Stages visibility and mixed: the test that a batch draws a triangle.
 
 // One byte per triangle.
 @group(1) @binding(24) var<storage, read> pass_masks: array<u32>;

@@ -8,6 +8,10 @@ const SLIGHT: f32 = 0.25;
 // Added to normals, so that all values are above 0.
 const NORMAL_SHIFT: f32 = 1.5;
 
+// Factor of the normals of metals that mirror sharply, and the roughness from which on metals do not.
+const MIRROR_SCALE: f32 = 256.0;
+const MIRROR_ROUGHNESS: f32 = 0.5;
+
 // The highest bits of a key: what its other bits say.
 const BY_NORMAL: u32 = 0x40000000u;
 const BY_COLOR: u32 = 0x80000000u;
@@ -49,8 +53,9 @@ fn step_of_linked(a: u32, b: u32) -> u32 {
         return STEP_NONE;
     }
     let front = is_negative(area_of_face(a));
-    let n_a = turned_to_viewer(face_normal(a), front) + NORMAL_SHIFT;
-    let n_b = turned_to_viewer(face_normal(b), front) + NORMAL_SHIFT;
+    let m = material_index(a);
+    let n_a = normal_values(m, face_normal(a), front);
+    let n_b = normal_values(m, face_normal(b), front);
     return step_of_looks(Look(n_a, n_a, 0u), Look(n_b, n_b, 0u));
 }
 
@@ -98,12 +103,12 @@ fn look_of(id: u32) -> Look {
     }
     let front = is_negative(area_of_face(id));
     if (flags & MATERIAL_VERTEX_NORMALS) == 0u {
-        let n = turned_to_viewer(face_normal(id), front) + NORMAL_SHIFT;
+        let n = normal_values(m, face_normal(id), front);
         return Look(n, n, key);
     }
-    let a = turned_to_viewer(normal_at(id, 0u), front) + NORMAL_SHIFT;
-    let b = turned_to_viewer(normal_at(id, 1u), front) + NORMAL_SHIFT;
-    let c = turned_to_viewer(normal_at(id, 2u), front) + NORMAL_SHIFT;
+    let a = normal_values(m, normal_at(id, 0u), front);
+    let b = normal_values(m, normal_at(id, 1u), front);
+    let c = normal_values(m, normal_at(id, 2u), front);
     return Look(min(min(a, b), c), max(max(a, b), c), key);
 }
 
@@ -151,6 +156,14 @@ fn shared_corners(start: u32, a: u32, b: u32) -> u32 {
         }
     }
     return pairs;
+}
+
+// The values of a normal.
+fn normal_values(m: u32, n: vec3<f32>, front: bool) -> vec3<f32> {
+    let may_be_smooth =
+        materials[m].roughness < MIRROR_ROUGHNESS || use_of(m, SLOT_METALLIC_ROUGHNESS).texture != TEXTURE_NONE;
+    let scale = select(1.0, MIRROR_SCALE, materials[m].metallic > 0.0 && may_be_smooth);
+    return scale * (turned_to_viewer(n, front) + NORMAL_SHIFT);
 }
 
 fn own_material(id: u32) -> u32 {

@@ -1,4 +1,4 @@
-// Stage mixed: what samples see, and where colours break off from one to the next.
+// Stage mixed: the faces that samples show, and where colours break off from one to the next.
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;

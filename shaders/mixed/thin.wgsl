@@ -7,11 +7,11 @@
 const ASPECT: i32 = 4;
 // Thin triangles are less high than this, 1/256 px.
 const HEIGHT_MAX: i32 = 256;
-// Pixels on each side of the longer side's line in which a thin triangle may lie, at most.
-const REACH_PX: i32 = 2;
+// By so much a line's place may be rounded, 1/256 px. Which pixels a triangle touches is decided by integers.
+const SLACK: i32 = 4;
 // Thin triangles are this long, 1/256 px, or more.
 const LENGTH_MIN: i32 = 256;
-// Longest sides count as no longer than this, 1/256 px, where they are squared.
+// What is this long, 1/256 px, and less than HEIGHT_MAX high is ASPECT times as long as high in any case.
 const LENGTH_MAX: i32 = 32768;
 
 @compute @workgroup_size(WORKGROUP)
@@ -40,12 +40,11 @@ fn is_thin(x: vec3<i32>, y: vec3<i32>, area: vec2<u32>) -> bool {
         positive = negate_wide(area);
     }
     let length = max(max(max(x.x, x.y), x.z) - min(min(x.x, x.y), x.z), max(max(y.x, y.y), y.z) - min(min(y.x, y.y), y.z));
-    let bounded = min(length, LENGTH_MAX);
-    let is_low = is_negative(sub_wide(positive, mul_wide(HEIGHT_MAX, length)));
-    let four = mul_wide(ASPECT, bitcast<i32>(positive.x));
-    // An area of more than the square has more than 31 bits, or is less than it.
-    return length >= LENGTH_MIN && is_low && positive.y == 0u && positive.x < 0x40000000u
-        && !is_negative(sub_wide(mul_wide(bounded, bounded), four));
+    if length < LENGTH_MIN || !is_negative(sub_wide(positive, mul_wide(HEIGHT_MAX, length))) {
+        return false;
+    }
+    // The area has less than 30 bits from here on.
+    return length >= LENGTH_MAX || ASPECT * bitcast<i32>(positive.x) <= length * length;
 }
 
 // Marks the pixels that a triangle touches.
@@ -55,52 +54,68 @@ fn follow(s: Setup, id: u32) {
     let y = s.y + half.y;
     let low = vec2(min(min(x.x, x.y), x.z), min(min(y.x, y.y), y.z));
     let high = vec2(max(max(x.x, x.y), x.z), max(max(y.x, y.y), y.z));
-    // Columns and rows of points, each in the middle of 1/256 px.
+    // Points lie in the middle of 1/256 px, so there is none where low is high.
     if any(low >= high) {
         return;
     }
     let first = max(low >> vec2(8u), vec2(0, batch.row_first));
     let last = min((high - 1) >> vec2(8u), vec2(frame.width, batch.row_end) - 1);
-    let size = high - low;
-    let is_upright = size.x < size.y;
-    // Along the longer side, and across it.
+    let is_upright = high.x - low.x < high.y - low.y;
+    // Along the longer side, and across it: its ends, and on which side of it the third corner lies.
     let along = select(x, y, is_upright);
     let across = select(y, x, is_upright);
-    let ends = select(low.x, low.y, is_upright);
-    let length = max(size.x, size.y);
-    let near = select(select(across.z, across.y, along.y == ends), across.x, along.x == ends);
-    let far = ends + length;
-    let to = select(select(across.z, across.y, along.y == far), across.x, along.x == far);
-    let rise = f32(to - near) / f32(length);
+    let ends = vec2(select(low.x, low.y, is_upright), select(high.x, high.y, is_upright));
+    let start = corner_at(along, ends.x);
+    let end = corner_at(along, ends.y);
+    let third = 3u - start - end;
+    let origin = vec2(ends.x, across[start]);
+    let slope = f32(across[end] - origin.y) / f32(ends.y - ends.x);
+    let aside = across[third] - line_at(origin, slope, along[third]);
+    let slack = i32(128.0 * abs(slope)) + SLACK;
     let e = edges_of(s);
     let steps = select(vec2(first.x, last.x), vec2(first.y, last.y), is_upright);
     let sides = select(vec2(first.y, last.y), vec2(first.x, last.x), is_upright);
     for (var step = steps.x; step <= steps.y; step++) {
-        let ahead = clamp(256 * step + 128 - ends, 0, length);
-        let middle = (near + i32(f32(ahead) * rise)) >> 8u;
-        let end = min(middle + REACH_PX, sides.y);
-        for (var beside = max(middle - REACH_PX, sides.x); beside <= end; beside++) {
+        let middle = line_at(origin, slope, clamp(256 * step + 128, ends.x, ends.y));
+        let beside_last = min((middle + max(aside, 0) + slack) >> 8u, sides.y);
+        for (var beside = max((middle + min(aside, 0) - slack) >> 8u, sides.x); beside <= beside_last; beside++) {
             mark(s, e, select(vec2(step, beside), vec2(beside, step), is_upright), id);
         }
     }
 }
 
-// Marks a pixel if the triangle touches it, some sample sees what may lie behind it, and colours break off.
+// Number of the first corner at this place.
+fn corner_at(places: vec3<i32>, place: i32) -> u32 {
+    return select(select(2u, 1u, places.y == place), 0u, places.x == place);
+}
+
+// Where a line through a point is, that much further along.
+fn line_at(origin: vec2<i32>, slope: f32, along: i32) -> i32 {
+    return origin.y + i32(f32(along - origin.x) * slope);
+}
+
+// Marks a pixel if the triangle touches it, some sample sees what may lie behind it, none sees the triangle, and colours
+// break off.
 fn mark(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
-    var may_be_seen = false;
-    for (var n = 0; n < sample_count(); n++) {
-        may_be_seen |= s.depth_range.y > depth_of(pixel, n);
-    }
-    if !may_be_seen || is_beside(e, point_edges(s, e, pixel_corner(pixel))) {
+    // Adaptive plans have four samples. They are written out, because a thread may run few iterations only
+    // (src/backend/gpu/schedule/tiles.rs).
+    let ids = vec4(id_at(pixel, 0), id_at(pixel, 1), id_at(pixel, 2), id_at(pixel, 3));
+    let depths = vec4(depth_of(pixel, 0), depth_of(pixel, 1), depth_of(pixel, 2), depth_of(pixel, 3));
+    let are_behind = depths < vec4(s.depth_range.y);
+    if !any(are_behind) || any(ids == vec4(id)) || is_beside(e, point_edges(s, e, pixel_corner(pixel))) {
         return;
     }
-    var found = 0u;
-    for (var n = 0; n < sample_count(); n++) {
-        if s.depth_range.y > depth_of(pixel, n) {
-            found |= breaks_of(step_between(id_at(pixel, n), id), BREAKS_THIN);
-        }
-    }
+    var found = breaks_to(id, ids.x, are_behind.x) | breaks_to(id, ids.y, are_behind.y);
+    found |= breaks_to(id, ids.z, are_behind.z) | breaks_to(id, ids.w, are_behind.w);
     if found != 0u {
         atomicOr(&mixed[breaks_at(pixel)], found);
     }
+}
+
+// The bits of the step from what a sample sees, if it lies behind.
+fn breaks_to(id: u32, seen: u32, is_behind: bool) -> u32 {
+    if !is_behind {
+        return 0u;
+    }
+    return breaks_of(step_between(seen, id), BREAKS_THIN);
 }

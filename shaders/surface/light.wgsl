@@ -71,25 +71,25 @@ fn surroundings(right: f32, up: f32, roughness: f32) -> f32 {
     let inverse = quick_recip(rn(3.6 * rn(alpha * sum)));
     let blur = rn(rn(6.48 * rn(alpha * alpha)) * inverse);
     let sharpness = min(rn(rn(sum * sum) * inverse), 25.0);
-    let sky = rise(up, 0.0, min(sharpness, 2.0));
+    let sky = soft_step(up, 0.0, min(sharpness, 2.0));
     var windows = 0.0;
     windows += rn(3.5 * window_share(right, up, vec4(-0.5, -0.22, 0.68, 0.86), sharpness));
     windows += rn(3.2 * window_share(right, up, vec4(0.74, 0.92, -0.35, 0.5), sharpness));
     windows += rn(3.2 * window_share(right, up, vec4(-0.92, -0.8, -0.4, 0.6), sharpness));
-    // Near the room's left, right, and above, a rectangle on screen covers more directions than it seems to: what
-    // is blurred sees them all.
+    // Towards the rim of the view a window has a larger solid angle than its rectangle, so blurred light gets more
+    // of it.
     return (0.08 + rn(0.34 * sky)) + rn((1.0 + rn(blur * blur)) * windows);
 }
 
 // Share of a window that is seen in a direction. Its edges: left, right, lower, upper.
 fn window_share(right: f32, up: f32, edges: vec4<f32>, sharpness: f32) -> f32 {
-    let across = rise(right, edges.x, sharpness) - rise(right, edges.y, sharpness);
-    let along = rise(up, edges.z, sharpness) - rise(up, edges.w, sharpness);
+    let across = soft_step(right, edges.x, sharpness) - soft_step(right, edges.y, sharpness);
+    let along = soft_step(up, edges.z, sharpness) - soft_step(up, edges.w, sharpness);
     return rn(across * along);
 }
 
 // 0 far below a soft edge, 1 far above.
-fn rise(place: f32, edge: f32, sharpness: f32) -> f32 {
+fn soft_step(place: f32, edge: f32, sharpness: f32) -> f32 {
     let t = clamp(0.5 + rn((place - edge) * sharpness), 0.0, 1.0);
     return rn(rn(t * t) * (3.0 - rn(2.0 * t)));
 }

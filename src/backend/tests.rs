@@ -101,8 +101,14 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add_same!("", kinds: BY_NORMAL BY_COLOR UNIQUE);
     add_same!("BREAKS_", breaks: OWN LEFT UPPER THIN HARD);
     add_same!("", thinness: ASPECT HEIGHT_MAX LENGTH_MIN LENGTH_MAX);
-    add_same!("", thin: REACH_PX);
-    add!("ALIKE" = look::ALIKE, "SLIGHT" = look::SLIGHT, "NORMAL_SHIFT" = look::NORMAL_SHIFT);
+    add_same!("", thin: SLACK);
+    add!("MIRROR_ROUGHNESS" = look::MIRROR_ROUGHNESS);
+    add!(
+        "ALIKE" = look::ALIKE,
+        "SLIGHT" = look::SLIGHT,
+        "MIRROR_SCALE" = look::MIRROR_SCALE,
+        "NORMAL_SHIFT" = look::NORMAL_SHIFT
+    );
     add!(
         "MATERIAL_VERTEX_NORMALS" = flags::VERTEX_NORMALS,
         "TEXTURE_NONE" = TEXTURE_NONE,

@@ -14,8 +14,8 @@ use error_table::ErrorTable;
 
 use crate::spec::words::word_for;
 use crate::spec::{
-    BackendChoice, FlatNormals, Hidden, Layers, OutlineMethod, QualityTarget, Samples, Shading, Spec, WIRE_METHODS,
-    Wire, WireMethod, WireThickness,
+    BackendChoice, FlatNormals, Ground, Hidden, Layers, OutlineMethod, QualityTarget, Samples, Shading, Spec, Surface,
+    WIRE_METHODS, Wire, WireMethod, WireThickness,
 };
 use crate::warning::Warning;
 
@@ -111,8 +111,7 @@ fn candidates(
     triangles: usize,
     has_gpu: bool,
 ) -> Vec<Candidate> {
-    // Without surfaces there are none that are adaptive.
-    let adaptive = styles(spec).any(|layers| layers.surface.is_some()).then_some(Samples::Adaptive);
+    let adaptive = can_be_adaptive(spec).then_some(Samples::Adaptive);
     let all_samples = || Samples::FIXED.iter().map(|&samples| Samples::Fixed(samples)).chain(adaptive);
     let samples = if target.open.samples { all_samples().collect() } else { vec![spec.image.samples] };
     let has_open_wire = target.open.wire || target.open.material_wires.contains(&true);
@@ -140,6 +139,13 @@ fn candidates(
         }
     }
     all
+}
+
+/// True if a request asks for filled surfaces, and for nothing transparent.
+fn can_be_adaptive(spec: &Spec) -> bool {
+    let surfaces = || styles(spec).filter_map(|layers| layers.surface.as_ref());
+    let is_opaque = |s: &Surface| s.opacity >= 1.0 && s.facing_opacity >= 1.0;
+    surfaces().next().is_some() && surfaces().all(is_opaque) && spec.ground == Ground::None
 }
 
 /// Sets the method of the open wires; false where that would not draw the same lines.

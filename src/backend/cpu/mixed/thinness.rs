@@ -1,4 +1,4 @@
-//! Stage mixed, per triangle: whether it is so thin that samples miss it.
+//! Stage mixed, per triangle: the test for triangles so thin that samples miss them.
 
 /// A thin triangle is this many times as long as it is high, or more.
 pub const ASPECT: i32 = 4;
@@ -9,21 +9,21 @@ pub const HEIGHT_MAX: i32 = 256;
 /// Thin triangles are this long, 1/256 px, or more: what is shorter covers less than 1/8 of a pixel.
 pub const LENGTH_MIN: i32 = 256;
 
-/// Longest sides count as no longer than this, 1/256 px, where they are squared.
+/// What is this long, 1/256 px, and less than [`HEIGHT_MAX`] high is [`ASPECT`] times as long as high in any case. Squares of
+/// lesser lengths have 30 bits.
 pub const LENGTH_MAX: i32 = 1 << 15;
 
 /// True if a triangle is long and less than a pixel high, and has an area. `twice_area` may be negative.
 #[inline(always)]
 pub fn is_thin(x: [i32; 3], y: [i32; 3], twice_area: i64) -> bool {
-    // Only what lies outside wraps, and nobody asks whether it is thin.
+    // Differences wrap only for triangles outside, whose result is not used.
     let size = |v: [i32; 3]| v[0].max(v[1]).max(v[2]).wrapping_sub(v[0].min(v[1]).min(v[2]));
     let length = size(x).max(size(y));
-    let bounded = i64::from(length.min(LENGTH_MAX));
-    let twice_area = twice_area.wrapping_abs();
+    let (long, twice_area) = (i64::from(length), twice_area.wrapping_abs());
     (length >= LENGTH_MIN)
         & (twice_area > 0)
-        & (twice_area < i64::from(HEIGHT_MAX) * i64::from(length))
-        & (i64::from(ASPECT) * twice_area <= bounded * bounded)
+        & (twice_area < i64::from(HEIGHT_MAX) * long)
+        & ((length >= LENGTH_MAX) | (i64::from(ASPECT).wrapping_mul(twice_area) <= long.wrapping_mul(long)))
 }
 
 #[cfg(test)]
@@ -53,5 +53,8 @@ mod tests {
         assert!(is_thin_of([[0, 0], [4096, 0], [4096, 255]]));
         assert!(!is_thin_of([[0, 0], [4096, 0], [4096, 256]]));
         assert!(!is_thin_of([[0, 0], [4096, 0], [8192, 0]]), "no area");
+        // As long as can be.
+        assert!(is_thin_of([[-1 << 20, 0], [1 << 20, 0], [1 << 20, 255]]));
+        assert!(!is_thin_of([[-1 << 20, 0], [1 << 20, 0], [1 << 20, 256]]));
     }
 }

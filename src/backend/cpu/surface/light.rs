@@ -170,8 +170,8 @@ pub fn light_lanes<const N: usize>(
     light
 }
 
-/// A window of the surroundings: a rectangle on screen, of directions of length 1. It is there twice, before the model
-/// and behind it.
+/// A window of the surroundings: a rectangle on screen, of directions of length 1. Directions before the model and
+/// behind it share it.
 struct Window {
     /// Left and right edge.
     right: [f32; 2],
@@ -198,21 +198,21 @@ fn surroundings(inverse_of: impl Fn(f32) -> f32, right: f32, up: f32, roughness:
     let inverse = inverse_of(3.6 * (alpha * sum));
     let blur = (6.48 * (alpha * alpha)) * inverse;
     let sharpness = ((sum * sum) * inverse).min(25.0);
-    let sky = rise(up, 0.0, sharpness.min(2.0));
+    let sky = soft_step(up, 0.0, sharpness.min(2.0));
     let mut windows = 0.0;
     for window in &WINDOWS {
-        let across = rise(right, window.right[0], sharpness) - rise(right, window.right[1], sharpness);
-        let along = rise(up, window.up[0], sharpness) - rise(up, window.up[1], sharpness);
+        let across = soft_step(right, window.right[0], sharpness) - soft_step(right, window.right[1], sharpness);
+        let along = soft_step(up, window.up[0], sharpness) - soft_step(up, window.up[1], sharpness);
         windows += window.brightness * (across * along);
     }
-    // Near the room's left, right, and above, a rectangle on screen covers more directions than it seems to: what
-    // is blurred sees them all.
+    // Towards the rim of the view a window has a larger solid angle than its rectangle, so blurred light gets more
+    // of it.
     (GROUND + SKY_ABOVE_GROUND * sky) + (1.0 + blur * blur) * windows
 }
 
 /// 0 far below a soft edge, 1 far above.
 #[inline(always)]
-fn rise(place: f32, edge: f32, sharpness: f32) -> f32 {
+fn soft_step(place: f32, edge: f32, sharpness: f32) -> f32 {
     let t = (0.5 + (place - edge) * sharpness).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }

@@ -328,10 +328,14 @@ impl Schedule {
         }
         self.dispatch(device, Kernel::Breaks, around, Batch { count: around, ..pixels })?;
         for Pass { ids, faces, pass_bit, .. } in Pass::of_visibility(plan).into_iter().flatten() {
-            let count = ids.end - ids.start;
-            let batch =
-                Batch { first: ids.start, count, faces: faces_code(faces), pass_bit: u32::from(pass_bit), ..pixels };
-            self.dispatch(device, Kernel::Thin, count, batch)?;
+            for first in ids.clone().step_by(CHUNK as usize) {
+                let (count, pass_bit) = (CHUNK.min(ids.end - first), u32::from(pass_bit));
+                let batch = Batch { first, count, faces: faces_code(faces), pass_bit, ..pixels };
+                self.dispatch(device, Kernel::Thin, count, batch)?;
+                if ids.len() > CHUNK as usize {
+                    self.steps.push(Step::Submit);
+                }
+            }
         }
         self.dispatch(device, Kernel::MixedPixels, pixels.count, pixels)?;
         let slots = self.banding.slots(plan);

@@ -134,10 +134,10 @@ pub fn page(rows: &[Row], machine: &Machine, effort: Effort, before: &str) -> St
 /// The section of whole pictures: a plot, and the same as numbers.
 fn whole(text: &mut String, rows: &[Row]) {
     text.push_str(
-        "## Whole pictures: run time against error\n\n![Run time against error, of whole pictures](whole-pictures.svg)\n\nAll pixels count, as \
-         users see them: RMSE of encoded colour, /255, where picture or truth differ from the background. Each cell is a geometric mean over the \
+        "## Whole pictures: run time against error\n\n![Run time against error, of whole pictures](whole-pictures.svg)\n\nEdges count here as \
+         much as what lies between them: RMSE of encoded colour, /255, of all pixels but those that are background in picture and truth. Each cell is a geometric mean over the \
          scenes: the error, and the time as a ratio to that of 4 samples. 64 samples are 16 in a picture of twice the columns and \
-         rows, scaled down.\n\n| picture | back-end |",
+         rows, scaled down; the scaling is not timed.\n\n| picture | back-end |",
     );
     WHOLE_SAMPLES.iter().for_each(|samples| {
         let _ = write!(text, " {samples} |");

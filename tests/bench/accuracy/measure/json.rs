@@ -87,7 +87,7 @@ fn schema() -> Value {
         "rows[].technique": "wire.method, outline.method or surface.normals of the request; texture: filtering, without light; of whole pictures: what \
                              is drawn",
         "rows[].backend": "cpu-N with N threads, or gpu",
-        "rows[].samples": "image.samples; 64: 16 in a picture of twice the columns and rows, scaled down",
+        "rows[].samples": "image.samples; 64: 16 in a picture of twice the columns and rows, scaled down, which is not timed",
         "rows[].thickness": "wire.thickness or outline.thickness (px), chosen so that the technique is nominally as wide as the truth",
         "rows[].median_ms": "median time of Renderer::draw",
         "rows[].time_ratio": "median_ms over that of the baseline",

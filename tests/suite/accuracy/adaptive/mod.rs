@@ -43,6 +43,8 @@ const CASES: &[Case] = &[
     ("smooth rings", meshes::rings, "smooth", "headlight"),
     ("boxes", shapes::boxes_on_a_floor, "flat", "three-point"),
     ("stacked boxes", shapes::stacked_boxes, "flat", "headlight"),
+    ("metal ball", || meshes::icosphere(4), "flat", "headlight"),
+    ("metal gear", || shapes::gear(9), "flat", "studio"),
 ];
 
 /// Opaque lines over faces: along all of their borders, or along some.
@@ -88,7 +90,12 @@ impl Truth {
 fn plan_of<'a>(mesh: &'a meshsnap::mesh::Mesh, (name, _, style, light): &Case) -> DrawPlan<'a> {
     let size = cases("64x56", "320x280");
     let keys = [("size", size), ("style", style), ("light.preset", light), ("samples", "adaptive")];
-    let mut keys = [&keys[..], &[("surface.metallic", "0")]].concat();
+    let metal = if name.starts_with("metal") {
+        [("surface.metallic", "1"), ("surface.roughness", "0.2")]
+    } else {
+        [("surface.metallic", "0"), ("surface.roughness", "0.6")]
+    };
+    let mut keys = [&keys[..], &metal].concat();
     if name.starts_with("wired") {
         keys.extend([("wire.thickness", "1.5"), ("wire.hidden", "hide"), ("wire.color", "012")]);
     }

@@ -72,6 +72,63 @@ fn pixels_of_many_faces_have_the_same_bytes_too() {
     assert!(smallest > 30 && largest > 600, "{smallest} to {largest} mixed pixels");
 }
 
+/// A cloud of hairs: some leave the picture, or pass the eye.
+fn hairs(random: &mut Random) -> String {
+    let mut shape = crate::oracle::obj::Shape::default();
+    for _ in 0..400 {
+        let start: [f64; 3] = [0; 3].map(|_| random.range(-1.0, 1.0));
+        let step: [f64; 3] = [0; 3].map(|_| random.range(-0.6, 0.6));
+        let side: [f64; 3] = [0; 3].map(|_| random.range(-0.004, 0.004));
+        let corner = |along: f64, across: f64| std::array::from_fn(|k| start[k] + along * step[k] + across * side[k]);
+        let corners = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)].map(|p| shape.vertex(p));
+        shape.polygons.push(corners.to_vec());
+    }
+    shape.text()
+}
+
+/// Thin faces at all angles: culled, outlined, lined, out of the picture, in bands, and across wide pictures.
+#[test]
+fn hairs_have_the_same_pixels_everywhere() {
+    let mesh = scenes::mesh(&hairs(&mut Random(77)));
+    let inside: &[(&str, &str)] =
+        &[("camera.eye", "0.1,0.2,0.9"), ("camera.target", "0,0,0"), ("camera.fov_deg", "80")];
+    let looks: [&[(&str, &str)]; 6] = [
+        &[("size", "300x200")],
+        &[("size", "300x200"), ("surface.cull", "back"), ("surface.color", "c33")],
+        &[("size", "300x200"), ("style", "outline"), ("outline.method", "hull")],
+        &[("size", "200x300"), ("style", "technical")],
+        &[("size", "4096x16"), ("camera.margin", "0")],
+        &[("size", "64x1500"), ("style", "unlit")],
+    ];
+    let mut plain = CpuRenderer::plain(1);
+    let mut others: Vec<CpuRenderer> = Isa::available().into_iter().map(|isa| CpuRenderer::with_isa(2, isa)).collect();
+    others.push(CpuRenderer::new(3));
+    let mut gpus: Vec<GpuRenderer> = gpus().into_iter().flatten().map(|gpu| GpuRenderer::new(gpu.clone())).collect();
+    for (look, view) in looks.iter().flat_map(|look| [(look, &[][..]), (look, inside)]) {
+        let keys = [&[("style", "flat")], *look, view, &[("samples", "adaptive")]].concat();
+        // The last of equal keys counts.
+        let keys: Vec<(&str, &str)> = keys
+            .iter()
+            .enumerate()
+            .filter(|(i, key)| keys[i + 1..].iter().all(|other| other.0 != key.0))
+            .map(|(_, key)| *key)
+            .collect();
+        let plan = scenes::plan(&mesh, &scenes::spec(&keys));
+        assert!(plan.is_adaptive, "{keys:?}");
+        let want = draw(&mut plain, &plan);
+        let mixed = plain.draw_times().mixed_pixels;
+        assert!(mixed > 100, "{keys:?}: {mixed}");
+        for renderer in &mut others {
+            assert!(draw(renderer, &plan) == want, "{keys:?}");
+        }
+        for renderer in &mut gpus {
+            let found = draw(renderer, &plan);
+            assert_eq!(renderer.draw_times().mixed_pixels, mixed, "{keys:?}");
+            Likeness::of(&found, &want).assert(Tolerance::TWINS, &format!("{keys:?}"));
+        }
+    }
+}
+
 /// Faces with colours between their corners are alike where their normals are, as those of one colour.
 #[test]
 fn faces_that_share_a_colour_at_their_corners_go_on() {

@@ -85,7 +85,7 @@ impl Bounds {
     /// Those of a plan's picture.
     pub fn new(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2]) -> Self {
         Self {
-            needs_thin: plan.is_adaptive,
+            needs_thin: plan.has_mixed(),
             grid: if plan.is_adaptive { POINT_GRID } else { SampleGrid::new(plan.samples) },
             half: [plan.width_px, plan.height_px].map(|size| size as i32 * 128),
             ranges: [plan.seen_range(plan.width_px), plan.seen_range(plan.height_px)],
@@ -198,7 +198,7 @@ fn keep_plainly(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePas
                 kept.backs.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
             }
             let is_shown = lane.area < 0 && is_drawn(0) || lane.area > 0 && is_drawn(1);
-            if bounds.needs_thin && lane.is_seen && is_shown && lane.is_thin {
+            if lane.is_seen && is_shown && lane.is_thin {
                 kept.thin.ids.push(ids[l]);
                 kept.thin.spans.push(lane.span);
             }
@@ -229,11 +229,12 @@ impl Lane {
         let [columns, rows] = bounds.pixels_of([x, y]);
         let [top, bottom] = bounds.with_margin(rows);
         let is_seen = (columns[0] <= columns[1]) & (top <= bottom) & !is_outside;
+        let area = area_of(x, y);
         Self {
             is_outside,
             is_seen,
-            is_thin: is_thin(x, y, area_of(x, y)),
-            area: area_of(x, y),
+            is_thin: bounds.needs_thin && is_thin(x, y, area),
+            area,
             span: if is_seen { pair([top / bounds.rows, bottom / bounds.rows]) } else { 0 },
             boxed: BoxedFace { id: 0, columns: pair(columns), rows: pair(rows), depth_max: z[0].max(z[1]).max(z[2]) },
         }

@@ -8,7 +8,7 @@ use crate::backend::cpu::geometry::samples::NOTHING;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility::area;
 use crate::backend::cpu::vector::turned_to_viewer;
-use crate::plan::{ShadedMaterial, SurfacePass, TEXTURE_NONE, flags};
+use crate::plan::{ShadedMaterial, SurfacePass, TEXTURE_NONE, flags, slots};
 
 /// Flags of materials whose colour does not go on smoothly where faces share a corner.
 const BROKEN: u32 = flags::DERIVATIVE_NORMALS | flags::DEBUG | flags::WIRES | flags::BY_ANGLE;
@@ -22,6 +22,12 @@ pub const SLIGHT: f32 = 1.0 / 4.0;
 
 /// Added to normals, so that all values are above 0.
 pub const NORMAL_SHIFT: f32 = 1.5;
+
+/// Factor of the normals of metals that mirror sharply: those that differ by about a degree look alike.
+pub const MIRROR_SCALE: f32 = 256.0;
+
+/// Metals with less roughness mirror sharply.
+pub const MIRROR_ROUGHNESS: f32 = 0.5;
 
 /// The highest bits of a key: what its other bits say.
 pub mod kinds {
@@ -93,7 +99,7 @@ impl Look {
             return unique();
         }
         let key = kinds::BY_NORMAL | surface.triangle_materials.get(id as usize).copied().unwrap_or(0);
-        let shifted = |n: [f32; 3]| turned_to_viewer(n, area(&corners) < 0).map(|v| v + NORMAL_SHIFT);
+        let shifted = |n: [f32; 3]| normal_values(material, n, area(&corners) < 0);
         if material.flags & flags::LIT == 0 {
             return Self::of_one([0.0; 3], key);
         }
@@ -188,8 +194,17 @@ fn step_of_linked(context: &RasterContext<'_>, a: u32, b: u32) -> Step {
         return Step::None;
     }
     let front = area(&context.screen_triangle(a)) < 0;
-    let of = |id: u32| Look::of_one(turned_to_viewer(face_normal(surface, id), front).map(|v| v + NORMAL_SHIFT), 0);
+    let of = |id: u32| Look::of_one(normal_values(surface.material(a as usize), face_normal(surface, id), front), 0);
     of(a).step_to(&of(b))
+}
+
+/// The values of a normal.
+#[inline(always)]
+fn normal_values(material: &ShadedMaterial, normal: [f32; 3], front: bool) -> [f32; 3] {
+    let may_be_smooth =
+        material.roughness < MIRROR_ROUGHNESS || material.textures[slots::METALLIC_ROUGHNESS].texture != TEXTURE_NONE;
+    let scale = if material.metallic > 0.0 && may_be_smooth { MIRROR_SCALE } else { 1.0 };
+    turned_to_viewer(normal, front).map(|v| scale * (v + NORMAL_SHIFT))
 }
 
 #[inline(always)]

@@ -2,8 +2,8 @@
 //!
 //! A pixel is mixed if its samples and those of its four neighbours show several faces (or a face and
 //! nothing) and colours break off from one to the next ([`Pairs::step`]). Where an edge goes through a pixel
-//! without parting its samples, it parts those of neighbours. Pixels of thin triangles that no sample sees are mixed,
-//! too ([`thin`]).
+//! without parting its samples, it parts those of neighbours. Pixels of thin triangles are mixed, too, which no
+//! sample need see ([`thin`]).
 
 pub mod look;
 pub mod thin;
@@ -132,8 +132,8 @@ fn find_kernel(context: &RasterContext<'_>, triangles: &BandTriangles<'_>, band:
     let mut poll = DeadlinePoll::new(context.deadline);
     // A picture whose deadline has passed is thrown away.
     let _ = triangles.for_each_thin(|triangle| {
-        mark_thin(context, band, &triangle, &mut pairs, mixed);
-        if poll.is_expired(1) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let looked_at = mark_thin(context, band, &triangle, &mut pairs, mixed);
+        if poll.is_expired(looked_at as u64) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     for y in first..end {
         for y in y - 1..=y + 1 {

@@ -7,68 +7,78 @@ use super::look::Pairs;
 use super::{MixedPixels, breaks};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
+use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::mixed::band_triangles::ScreenTriangle;
 use crate::backend::cpu::mixed::points::POINT_GRID;
 use crate::backend::cpu::mixed::triangle::PointTriangle;
 
-/// Pixels on each side of the longer side's line in which a thin triangle may lie, at most.
-pub const REACH_PX: i32 = 2;
+/// By so much a line's place may be rounded, 1/256 px. Pixels beside the triangle do no harm, so both back-ends may round
+/// it as they like: which pixels it touches is decided by integers.
+pub const SLACK: i32 = 4;
 
-/// Marks the pixels of a band in which a thin triangle may be seen.
+/// Marks the pixels of a band in which a thin triangle may be seen. The number of samples that were looked at.
 #[inline(never)]
 pub fn mark_thin(
     context: &RasterContext<'_>,
     band: &SampleBand,
-    ScreenTriangle { id, corners, .. }: &ScreenTriangle,
+    triangle: &ScreenTriangle,
     pairs: &mut Pairs,
     mixed: &mut MixedPixels,
-) {
+) -> usize {
+    let ScreenTriangle { id, corners, .. } = triangle;
     let nearest = corners.iter().map(|v| v.z).fold(0.0, f32::max);
     // Made for the first pixel in which it may be seen: most thin triangles lie behind others.
     let mut points: Option<PointTriangle> = None;
-    let half = band.size_px.map(|size| 128 * size as i32);
-    let places = corners.each_ref().map(|v| [v.x + half[0], v.y + half[1]]);
+    let [width, height] = band.size_px.map(|size| size as i32);
+    let (first, mut looked_at) = (band.shown[0] as i32, 0);
+    for_each_pixel(corners, [width, height], band.shown.map(|row| row as i32), |[x, y]| {
+        let (ids, depths) = band.pixel(x, y);
+        looked_at += ids.len();
+        if !depths.iter().any(|depth| nearest > *depth) || ids.contains(id) {
+            return;
+        }
+        if points.is_none() {
+            points = PointTriangle::new(*id, corners);
+        }
+        let corner = [256 * x - 128 * width, 256 * y - 128 * height];
+        if points.as_ref().is_none_or(|points| points.at(corner).is_none()) {
+            return;
+        }
+        let mut found = 0;
+        for (&seen, _) in ids.iter().zip(depths).filter(|(_, depth)| nearest > **depth) {
+            found |= pairs.step(context, seen, *id).breaks(breaks::THIN);
+        }
+        mixed.thin[(y - first) as usize * width as usize + x as usize] |= found;
+    });
+    looked_at
+}
+
+/// Calls `each` with all pixels of some rows that a thin triangle touches, and with a few beside it.
+#[inline(always)]
+fn for_each_pixel(corners: &[ScreenVertex; 3], size_px: [i32; 2], rows: [i32; 2], mut each: impl FnMut([i32; 2])) {
+    let places = corners.each_ref().map(|v| [v.x + 128 * size_px[0], v.y + 128 * size_px[1]]);
     let extent = |axis: usize| {
         let all = places.map(|place| place[axis]);
         [all[0].min(all[1]).min(all[2]), all[0].max(all[1]).max(all[2])]
     };
-    let shown = [[0, band.size_px[0] as i32], band.shown.map(|row| row as i32)];
-    let bounds = [0, 1].map(|axis| POINT_GRID.pixels(extent(axis), shown[axis]));
+    let bounds = [POINT_GRID.pixels(extent(0), [0, size_px[0]]), POINT_GRID.pixels(extent(1), rows)];
     let sizes = [0, 1].map(|axis| extent(axis)[1] - extent(axis)[0]);
     let along = usize::from(sizes[0] < sizes[1]);
     let across = 1 - along;
-    // The ends of the side that is as long as the triangle.
-    let by_place = |a: &[i32; 2], b: &[i32; 2]| a[along].cmp(&b[along]);
-    let (Some(from), Some(to)) = (places.into_iter().min_by(by_place), places.into_iter().max_by(by_place)) else {
-        return;
-    };
-    let rise = (to[across] - from[across]) as f32 / sizes[along] as f32;
+    // The side that is as long as the triangle: its ends, and on which side of it the third corner lies.
+    let at_end = |end: usize| places.iter().position(|place| place[along] == extent(along)[end]).unwrap_or_default();
+    let (first, last) = (at_end(0), at_end(1));
+    let (start, end, third) = (places[first], places[last], places[3 - first - last]);
+    let slope = (end[across] - start[across]) as f32 / sizes[along] as f32;
+    let line_at = |ahead: i32| start[across] + (ahead as f32 * slope) as i32;
+    let aside = third[across] - line_at(third[along] - start[along]);
+    let slack = (128.0 * slope.abs()) as i32 + SLACK;
     for step in bounds[along][0]..=bounds[along][1] {
-        let ahead = (256 * step + 128 - from[along]).clamp(0, sizes[along]);
-        let middle = (from[across] + (ahead as f32 * rise) as i32) >> 8;
-        let [low, high] = [middle - REACH_PX, middle + REACH_PX];
+        let middle = line_at((256 * step + 128 - start[along]).clamp(0, sizes[along]));
+        let low = (middle + aside.min(0) - slack) >> 8;
+        let high = (middle + aside.max(0) + slack) >> 8;
         for beside in low.max(bounds[across][0])..=high.min(bounds[across][1]) {
-            let pixel = if along == 0 { [step, beside] } else { [beside, step] };
-            let corner = [256 * pixel[0] - half[0], 256 * pixel[1] - half[1]];
-            let (ids, depths) = band.pixel(pixel[0], pixel[1]);
-            let may_be_seen = depths.iter().any(|depth| nearest > *depth);
-            if !may_be_seen {
-                continue;
-            }
-            let Some(points) =
-                points.take().or_else(|| PointTriangle::new(*id, corners)).map(|own| &*points.insert(own))
-            else {
-                return;
-            };
-            if points.at(corner).is_none() {
-                continue;
-            }
-            let mut found = 0;
-            for (&seen, _) in ids.iter().zip(depths).filter(|(_, depth)| nearest > **depth) {
-                found |= pairs.step(context, seen, *id).breaks(breaks::THIN);
-            }
-            let row = (pixel[1] - shown[1][0]) as usize;
-            mixed.thin[row * band.size_px[0] as usize + pixel[0] as usize] |= found;
+            each(if along == 0 { [step, beside] } else { [beside, step] });
         }
     }
 }
