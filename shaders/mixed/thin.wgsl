@@ -11,7 +11,7 @@ const HEIGHT_MAX: i32 = 256;
 const SLACK: i32 = 4;
 // Thin triangles are this long, 1/256 px, or more.
 const LENGTH_MIN: i32 = 256;
-// What is this long, 1/256 px, and less than HEIGHT_MAX high is ASPECT times as long as high in any case.
+// Triangles of this length, 1/256 px, that are less than HEIGHT_MAX high are ASPECT times as long in any case.
 const LENGTH_MAX: i32 = 32768;
 
 @compute @workgroup_size(WORKGROUP)
@@ -94,8 +94,8 @@ fn line_at(origin: vec2<i32>, slope: f32, along: i32) -> i32 {
     return origin.y + i32(f32(along - origin.x) * slope);
 }
 
-// Marks a pixel if the triangle touches it, some sample sees what may lie behind it, none sees the triangle, and colours
-// break off.
+// Marks a pixel if the triangle touches it, some sample sees what may lie behind it, none sees the triangle, and
+// colours break off.
 fn mark(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
     // Adaptive plans have four samples. They are written out, because a thread may run few iterations only
     // (src/backend/gpu/schedule/tiles.rs).

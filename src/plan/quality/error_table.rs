@@ -60,7 +60,8 @@ impl ErrorTable {
     /// The row of a technique on the back-end of this name; the CPU's row where the table has no
     /// GPU, since their pictures agree.
     ///
-    /// With adaptive samples, techniques that do not get better by them have the row of the samples that all pixels have.
+    /// With adaptive samples, techniques that do not get better by them have the row of the samples that all pixels
+    /// have.
     pub fn row(&self, technique: &str, backend: &str, samples: Samples) -> Option<&Row> {
         let find = |backend: &str, samples: Samples| {
             let is_it = |row: &&Row| row.technique == technique && row.backend == backend && row.samples.0 == samples;

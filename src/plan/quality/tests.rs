@@ -12,6 +12,7 @@ fn spec(keys: &[(&str, &str)]) -> Spec {
 const TABLE: &str = r#"{ "gpu_is_software": GPU, "size_px": 512, "rows": [
     {"technique":"face","backend":"cpu","samples":1,"error":5,"ms_per_megapixel":10,"ms_per_kilotriangle":0},
     {"technique":"face","backend":"cpu","samples":4,"error":2,"ms_per_megapixel":20,"ms_per_kilotriangle":0},
+    {"technique":"face","backend":"cpu","samples":"adaptive","error":0.5,"ms_per_megapixel":40,"ms_per_kilotriangle":0},
     {"technique":"exact","backend":"cpu","samples":1,"error":1.5,"ms_per_megapixel":10,"ms_per_kilotriangle":1},
     {"technique":"exact","backend":"cpu","samples":4,"error":1,"ms_per_megapixel":20,"ms_per_kilotriangle":1},
     {"technique":"fwidth","backend":"cpu","samples":1,"error":60,"ms_per_megapixel":30,"ms_per_kilotriangle":0.1},
@@ -127,6 +128,23 @@ fn the_worst_technique_of_all_materials_counts() {
     let chosen = select_from(&table(true), &spec(&keys), 100_000, false).unwrap();
     assert_eq!(chosen.spec.materials[0].1.wire.unwrap().method, WireMethod::Fwidth);
     assert!(chosen.spec.layers.wire.is_none());
+}
+
+#[test]
+fn adaptive_samples_are_chosen_where_a_picture_can_have_them() {
+    let chosen = |keys: &[(&str, &str)]| {
+        let keys = [&[("size", "1000"), ("backend", "cpu")], keys].concat();
+        let found = select_from(&table(false), &spec(&keys), 7, false).unwrap();
+        (found.selection.samples, found.selection.expected_error)
+    };
+    assert_eq!(chosen(&[("max_error", "0.6")]), (Samples::Adaptive, 0.5));
+    assert_eq!(chosen(&[("max_error", "2.5")]), (Samples::Fixed(4), 2.0));
+    // Exact lines have no error of their own with adaptive samples: that of 4 counts.
+    assert_eq!(chosen(&[("max_error", "1.2"), ("wire.method", "exact")]), (Samples::Adaptive, 1.0));
+    for see_through in [("surface.opacity", "0.5"), ("surface.facing_opacity", "0.1"), ("scene.ground", "shadow")] {
+        assert_eq!(chosen(&[("max_error", "0.6"), see_through]), (Samples::Fixed(4), 2.0), "{see_through:?}");
+    }
+    assert_eq!(chosen(&[("max_error", "0.6"), ("surface", "null"), ("wire", "{}")]).0, Samples::Fixed(4));
 }
 
 #[test]

@@ -4,7 +4,7 @@
 //!     cargo bench --bench accuracy                            # all scenes; some minutes
 //!     cargo bench --bench accuracy -- --quick                 # few and small scenes, few rounds; under a minute
 //!     cargo bench --bench accuracy -- --scene 'deep rings'    # one scene, as often as it is named
-//!     cargo bench --bench accuracy -- --write                 # all, and docs/accuracy.{json,md}, docs/{work-precision,whole-pictures}.svg
+//!     cargo bench --bench accuracy -- --write                 # all, and docs/accuracy.{json,md}, docs/*.svg of it
 //!                                                             # and src/plan/quality/error_table.json
 //!     cargo bench --bench accuracy -- --table-only            # the last of these, from docs/accuracy.json as it is
 //!

@@ -9,8 +9,8 @@ pub const HEIGHT_MAX: i32 = 256;
 /// Thin triangles are this long, 1/256 px, or more: what is shorter covers less than 1/8 of a pixel.
 pub const LENGTH_MIN: i32 = 256;
 
-/// What is this long, 1/256 px, and less than [`HEIGHT_MAX`] high is [`ASPECT`] times as long as high in any case. Squares of
-/// lesser lengths have 30 bits.
+/// Triangles of this length, 1/256 px, that are less than [`HEIGHT_MAX`] high are [`ASPECT`] times as long in any case.
+/// Squares of lesser lengths have 30 bits.
 pub const LENGTH_MAX: i32 = 1 << 15;
 
 /// True if a triangle is long and less than a pixel high, and has an area. `twice_area` may be negative.

@@ -155,21 +155,7 @@ impl Kernel {
             ]
             .concat()
             .concat(),
-            Self::Breaks => {
-                let kernel = include_str!("../../../../shaders/mixed/breaks.wgsl");
-                [&[TRIANGLE], SHADE, &[HULL, MIXED_PLACE, LOOK, SEEN_FACES, kernel]].concat().concat()
-            }
-            Self::Thin => {
-                let kernel = include_str!("../../../../shaders/mixed/thin.wgsl");
-                [&[TRIANGLE], SHADE, &[HULL, CULLING, MIXED_PLACE, LOOK, SEEN_FACES, POINT_EDGES, kernel]]
-                    .concat()
-                    .concat()
-            }
-            Self::MixedPixels => [MIXED_PLACE, include_str!("../../../../shaders/mixed/mixed_pixels.wgsl")].concat(),
-            Self::MixedColor => {
-                let kernel = include_str!("../../../../shaders/mixed/mixed_color.wgsl");
-                [&[TRIANGLE], SHADE, &[HULL, PLACE, SPREAD, MIXED_PLACE, MIXED_LATTICE, kernel]].concat().concat()
-            }
+            Self::Breaks | Self::Thin | Self::MixedPixels | Self::MixedColor => self.mixed_source(),
             Self::LineLight => {
                 [&[TRIANGLE], SHADE, &[include_str!("../../../../shaders/lines/line_light.wgsl")]].concat().concat()
             }
@@ -187,6 +173,26 @@ impl Kernel {
             }
             Self::Resolve => [OVER, ENCODE, include_str!("../../../../shaders/resolve.wgsl")].concat(),
         }
+    }
+
+    /// The source of the kernels of stage mixed alone.
+    fn mixed_source(self) -> String {
+        let parts: &[&str] = match self {
+            Self::Breaks => {
+                &[HULL, MIXED_PLACE, LOOK, SEEN_FACES, include_str!("../../../../shaders/mixed/breaks.wgsl")]
+            }
+            Self::Thin => {
+                let kernel = include_str!("../../../../shaders/mixed/thin.wgsl");
+                &[HULL, CULLING, MIXED_PLACE, LOOK, SEEN_FACES, POINT_EDGES, kernel]
+            }
+            Self::MixedColor => {
+                let kernel = include_str!("../../../../shaders/mixed/mixed_color.wgsl");
+                &[HULL, PLACE, SPREAD, MIXED_PLACE, MIXED_LATTICE, kernel]
+            }
+            // Numbers of pixels alone.
+            _ => return [MIXED_PLACE, include_str!("../../../../shaders/mixed/mixed_pixels.wgsl")].concat(),
+        };
+        [&[TRIANGLE], SHADE, parts].concat().concat()
     }
 
     /// Bits of the key that the kernel reads: there is a pipeline for every combination in use.

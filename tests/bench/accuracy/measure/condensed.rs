@@ -14,7 +14,8 @@ const KINDS: [(&str, &str); 2] = [("cpu", "cpu-1"), ("gpu", "gpu")];
 
 /// From the document that `json.rs` writes, so that a table can be made without measuring again.
 pub fn table(document: &Value) -> String {
-    // What a request may choose among: textures are filtered in one way, and whole pictures are made of several techniques.
+    // What a request may choose among: textures are filtered in one way, and whole pictures are made of several
+    // techniques.
     let choices = [Family::Wires, Family::Outlines, Family::Faces].map(Family::techniques).concat();
     let is_choice = |row: &&Value| choices.iter().any(|technique| row["technique"] == technique.name());
     let rows: Vec<&Value> = document["rows"].as_array().expect("rows").iter().filter(is_choice).collect();

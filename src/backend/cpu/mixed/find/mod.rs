@@ -196,8 +196,8 @@ impl MixedPixels {
         below == above
     }
 
-    /// Marks the mixed pixels of a row: those where colours break off in the pixel, in one beside, above or below it, or
-    /// on the way from its first sample to theirs. `row` is its number among the shown ones.
+    /// Marks the mixed pixels of a row: those where colours break off in the pixel, in one beside, above or below it,
+    /// or on the way from its first sample to theirs. `row` is its number among the shown ones.
     #[inline(always)]
     fn join(&mut self, y: i32, row: usize) {
         const OWN: u8 = breaks::OWN | breaks::OWN << breaks::HARD;

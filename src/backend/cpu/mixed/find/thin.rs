@@ -12,8 +12,8 @@ use crate::backend::cpu::mixed::band_triangles::ScreenTriangle;
 use crate::backend::cpu::mixed::points::POINT_GRID;
 use crate::backend::cpu::mixed::triangle::PointTriangle;
 
-/// By so much a line's place may be rounded, 1/256 px. Pixels beside the triangle do no harm, so both back-ends may round
-/// it as they like: which pixels it touches is decided by integers.
+/// By so much a line's place may be rounded, 1/256 px. Back-ends may round it differently: more pixels do no harm,
+/// since integers decide which of them the triangle touches.
 pub const SLACK: i32 = 4;
 
 /// Marks the pixels of a band in which a thin triangle may be seen. The number of samples that were looked at.
