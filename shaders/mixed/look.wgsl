@@ -49,11 +49,11 @@ fn step_of_linked(a: u32, b: u32) -> u32 {
     if !are_linked(a, b) {
         return STEP_HARD;
     }
-    if (materials[material_index(a)].flags & MATERIAL_FACE_NORMALS) == 0u {
+    let m = material_index(a);
+    if (materials[m].flags & MATERIAL_FACE_NORMALS) == 0u {
         return STEP_NONE;
     }
     let front = is_negative(area_of_face(a));
-    let m = material_index(a);
     let n_a = normal_values(m, face_normal(a), front);
     let n_b = normal_values(m, face_normal(b), front);
     return step_of_looks(Look(n_a, n_a, 0u), Look(n_b, n_b, 0u));

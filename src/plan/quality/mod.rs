@@ -144,7 +144,8 @@ fn candidates(
 /// True if a request asks for filled surfaces, and for nothing transparent.
 fn can_be_adaptive(spec: &Spec) -> bool {
     let surfaces = || styles(spec).filter_map(|layers| layers.surface.as_ref());
-    let is_opaque = |s: &Surface| s.opacity >= 1.0 && s.facing_opacity >= 1.0;
+    let is_opaque =
+        |s: &Surface| s.opacity >= 1.0 && s.facing_opacity >= 1.0 && s.color.is_none_or(|color| color.0[3] >= 1.0);
     surfaces().next().is_some() && surfaces().all(is_opaque) && spec.ground == Ground::None
 }
 

@@ -141,7 +141,13 @@ fn adaptive_samples_are_chosen_where_a_picture_can_have_them() {
     assert_eq!(chosen(&[("max_error", "2.5")]), (Samples::Fixed(4), 2.0));
     // Exact lines have no error of their own with adaptive samples: that of 4 counts.
     assert_eq!(chosen(&[("max_error", "1.2"), ("wire.method", "exact")]), (Samples::Adaptive, 1.0));
-    for see_through in [("surface.opacity", "0.5"), ("surface.facing_opacity", "0.1"), ("scene.ground", "shadow")] {
+    let see_through = [
+        ("surface.opacity", "0.5"),
+        ("surface.facing_opacity", "0.1"),
+        ("surface.color", "#fff8"),
+        ("scene.ground", "shadow"),
+    ];
+    for see_through in see_through {
         assert_eq!(chosen(&[("max_error", "0.6"), see_through]), (Samples::Fixed(4), 2.0), "{see_through:?}");
     }
     assert_eq!(chosen(&[("max_error", "0.6"), ("surface", "null"), ("wire", "{}")]).0, Samples::Fixed(4));

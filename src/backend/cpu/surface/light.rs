@@ -160,8 +160,8 @@ pub fn light_lanes<const N: usize>(
         let mirrored = |axis: [f32; 3], n_axis: f32| 2.0 * (n_view * n_axis) - dot(projection.to_viewer, axis);
         let right = mirrored(projection.screen_right, dot(n, projection.screen_right));
         let up = mirrored(projection.screen_up, n_up);
-        let room = surroundings(&inverse_of, right, up, roughness[l]);
-        let seen = metallic[l] * (lights.ambient + 0.5 * strength) * room;
+        let brightness = surroundings(&inverse_of, right, up, roughness[l]);
+        let seen = metallic[l] * (lights.ambient + 0.5 * strength) * brightness;
         let (gain, gloss) = (light.gain[l] + seen * (1.0 - rise), light.gloss[l] + seen * rise);
         let is_metal = metallic[l] > 0.0;
         light.gain[l] = if is_metal { gain } else { light.gain[l] };
@@ -180,7 +180,7 @@ struct Window {
     brightness: f32,
 }
 
-/// One above the viewer's left shoulder, and a high one at each side.
+/// One above the viewer's left shoulder, and a tall one at each side.
 const WINDOWS: [Window; 3] = [
     Window { right: [-0.5, -0.22], up: [0.68, 0.86], brightness: 3.5 },
     Window { right: [0.74, 0.92], up: [-0.35, 0.5], brightness: 3.2 },
