@@ -39,6 +39,9 @@ pub mod kinds {
     pub const UNIQUE: u32 = 3 << 30;
 }
 
+/// Place of the lowest bit of a key that says its kind.
+const KIND_SHIFT: u32 = 30;
+
 /// Flags of materials whose colour depends on more than a normal.
 const MANY_COLORED: u32 = flags::DERIVATIVE_NORMALS
     | flags::VERTEX_COLORS
@@ -112,6 +115,12 @@ impl Look {
             .fold(Self::of_one(shifted(a), key), |all, v| all.and(&Self::of_one(v, key)))
     }
 
+    /// True for faces that only their normal tells from others of their material, the same at all corners.
+    #[inline(always)]
+    fn is_of_one_normal(&self) -> bool {
+        self.keys[0] >> KIND_SHIFT == kinds::BY_NORMAL >> KIND_SHIFT && self.low == self.high
+    }
+
     /// The look of these faces and those.
     #[inline(always)]
     fn and(&self, other: &Self) -> Self {
@@ -145,8 +154,12 @@ impl Look {
     }
 }
 
-/// Pairs of faces that were compared last: neighbouring pixels show the same ones.
-pub struct Pairs([Pair; Pairs::COUNT]);
+/// Pairs of faces that were compared last, and the looks that were made for it: neighbouring pixels show the same ones.
+pub struct Pairs {
+    steps: [Pair; Pairs::STEPS],
+    /// Id and look of a face.
+    looks: [(u32, Look); Pairs::LOOKS],
+}
 
 #[derive(Clone, Copy)]
 struct Pair {
@@ -155,11 +168,15 @@ struct Pair {
 }
 
 impl Pairs {
-    const COUNT: usize = 1024;
+    const STEPS: usize = 1024;
+    const LOOKS: usize = 512;
 
     /// None but of nothing and nothing.
     pub fn new() -> Self {
-        Self([Pair { ids: [NOTHING; 2], step: Step::None }; Self::COUNT])
+        Self {
+            steps: [Pair { ids: [NOTHING; 2], step: Step::None }; Self::STEPS],
+            looks: [(NOTHING, Look::NOTHING); Self::LOOKS],
+        }
     }
 
     /// The step of colours from one of two ids to the other.
@@ -169,19 +186,31 @@ impl Pairs {
             return Step::None;
         }
         let ids = [a.min(b), a.max(b)];
-        let place = &mut self.0[ids[0].wrapping_mul(5).wrapping_add(ids[1]) as usize % Self::COUNT];
-        if place.ids != ids {
-            *place = Pair { ids, step: step(context, ids) };
+        let place = ids[0].wrapping_mul(5).wrapping_add(ids[1]) as usize % Self::STEPS;
+        if self.steps[place].ids != ids {
+            self.steps[place] = Pair { ids, step: self.new_step(context, ids) };
         }
-        place.step
+        self.steps[place].step
     }
-}
 
-#[inline(never)]
-fn step(context: &RasterContext<'_>, [a, b]: [u32; 2]) -> Step {
-    match Look::of(context, a).step_to(&Look::of(context, b)) {
-        Step::None => Step::None,
-        step => step.min(step_of_linked(context, a, b)),
+    #[inline(never)]
+    fn new_step(&mut self, context: &RasterContext<'_>, [a, b]: [u32; 2]) -> Step {
+        let looks = [a, b].map(|id| self.look(context, id));
+        match looks[0].step_to(&looks[1]) {
+            Step::None => Step::None,
+            // Of linked ones all goes on but the normal, which has been compared.
+            step if looks.iter().all(Look::is_of_one_normal) => step,
+            step => step.min(step_of_linked(context, a, b)),
+        }
+    }
+
+    #[inline(always)]
+    fn look(&mut self, context: &RasterContext<'_>, id: u32) -> Look {
+        let (of, look) = &mut self.looks[id as usize % Self::LOOKS];
+        if *of != id {
+            (*of, *look) = (id, Look::of(context, id));
+        }
+        *look
     }
 }
 

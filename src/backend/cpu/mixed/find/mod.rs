@@ -82,9 +82,10 @@ impl MixedPixels {
         self.columns.reserve_exact(width * rows);
         self.needs_few.reserve_exact(width * rows);
         self.starts.reserve_exact(width * rows + 1);
+        self.starts.resize(width * rows + 1, 0);
         self.sums.clear();
         self.sums.reserve_exact((width + 1) * (rows + 1));
-        self.sums.resize(width + 1, 0);
+        self.sums.resize((width + 1) * (rows + 1), 0);
         for row in &mut self.breaks {
             row.reset(width);
         }
@@ -143,20 +144,13 @@ fn find_kernel(context: &RasterContext<'_>, triangles: &BandTriangles<'_>, band:
                 find_breaks(context, band, y, &mut pairs, &mut row.values);
             }
         }
-        mixed.join(y, (y - first) as usize);
-        let before = mixed.columns.len();
-        mixed.sums.push(0);
-        for x in 0..width {
-            mixed.starts.push(mixed.columns.len() as u32);
-            if mixed.is_mixed[x] != 0 {
-                mixed.columns.push(x as u16);
-                mixed.needs_few.push(mixed.is_mixed[x] >> breaks::HARD == 0);
-            }
-            let above = mixed.sums[mixed.sums.len() - width - 1];
-            mixed.sums.push(above + (mixed.columns.len() - before) as u32);
-        }
+        let row = (y - first) as usize;
+        mixed.join(y, row);
+        mixed.list(row);
     }
-    mixed.starts.push(mixed.columns.len() as u32);
+    if let Some(last) = mixed.starts.last_mut() {
+        *last = mixed.columns.len() as u32;
+    }
 }
 
 impl MixedPixels {
@@ -208,6 +202,35 @@ impl MixedPixels {
         for (x, out) in self.is_mixed.iter_mut().enumerate() {
             let beside = own[x] & OWN | own[x + 1] | own[x + 2] & (OWN | LEFT);
             *out = beside | above[x + 1] & OWN | below[x + 1] & (OWN | UPPER) | thin[x];
+        }
+    }
+
+    /// Adds the marked pixels of a row to the lists. `row` is its number among the shown ones.
+    #[inline(always)]
+    fn list(&mut self, row: usize) {
+        let width = self.is_mixed.len();
+        let before = self.columns.len() as u32;
+        let starts = &mut self.starts[row * width..][..width];
+        let (above, own) = self.sums[row * (width + 1)..][..2 * (width + 1)].split_at_mut(width + 1);
+        let mut any = 0;
+        for bits in &self.is_mixed {
+            any |= bits;
+        }
+        if any == 0 {
+            starts.fill(before);
+            own.copy_from_slice(above);
+            return;
+        }
+        let mut count = 0;
+        let corners = above[1..].iter().zip(&mut own[1..]);
+        for (x, ((bits, start), (above, own))) in self.is_mixed.iter().zip(starts).zip(corners).enumerate() {
+            *start = before + count;
+            if *bits != 0 {
+                self.columns.push(x as u16);
+                self.needs_few.push(bits >> breaks::HARD == 0);
+                count += 1;
+            }
+            *own = above + count;
         }
     }
 }
