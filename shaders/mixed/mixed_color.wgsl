@@ -7,11 +7,14 @@
 // What the points see, in words like those of samples.
 @group(1) @binding(23) var<storage, read_write> points: array<vec2<u32>>;
 
-// Pixels of the round. Of the one that the workgroup colours: what each point sees, as in `points`, and what each triangle
-// adds to the colour, where the first of its points is.
+// Pixels of the round. Of the one that the workgroup colours: what each point sees, as in `points`; which points are the
+// first ones of their triangles, a bit each; and what each triangle adds to the colour, at the first of its points.
 var<workgroup> pixel_count: u32;
 var<workgroup> seen: array<vec2<u32>, POINTS>;
+var<workgroup> firsts: array<atomic<u32>, FIRSTS_WORDS>;
 var<workgroup> parts: array<vec4<f32>, POINTS>;
+
+const FIRSTS_WORDS: u32 = POINTS / 32u;
 
 @compute @workgroup_size(WORKGROUP)
 fn mixed_color(
@@ -43,19 +46,25 @@ fn color_pixel(i: u32, thread: u32) {
         // For the next pixel that has the place.
         points[i * POINTS + p] = vec2(0u);
     }
+    if thread < FIRSTS_WORDS {
+        atomicStore(&firsts[thread], 0u);
+    }
     workgroupBarrier();
     let step = select(1u, FEW_STEP, is_few);
     for (var p = select(thread, FEW_FIRST + FEW_STEP * thread, is_few); p < POINTS; p += step * WORKGROUP) {
-        parts[p] = vec4(0.0);
         if seen[p].y != 0u && is_first(p, step) {
+            atomicOr(&firsts[p / 32u], 1u << (p % 32u));
             parts[p] = part_of(p, step, pixel, own_z);
         }
     }
     workgroupBarrier();
     if thread == 0u {
+        // In the order of points, as the CPU adds them.
         var sum = vec4(0.0);
-        for (var p = select(0u, FEW_FIRST, is_few); p < POINTS; p += step) {
-            sum += parts[p];
+        for (var w = 0u; w < FIRSTS_WORDS; w++) {
+            for (var left = atomicLoad(&firsts[w]); left != 0u; left &= left - 1u) {
+                sum += parts[32u * w + firstTrailingBit(left)];
+            }
         }
         colors[at] = sum;
     }

@@ -117,6 +117,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!(
         "HEAD_WORDS" = MIXED_HEAD_BYTES / 4,
         "BORDER_WORDS" = POINTS / 32,
+        "FIRSTS_WORDS" = POINTS / 32,
         "PLACE_MAX" = points::PLACE_MAX,
         "FEW_STEP" = points::Lattice::<1>::STEP
     );

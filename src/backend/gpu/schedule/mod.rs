@@ -274,7 +274,7 @@ impl Schedule {
                         large_end: u32::MAX,
                         huge_end: u32::MAX,
                         pass_bit: u32::from(pass_bit),
-                        alone_size: alone_size(in_chunk, device),
+                        alone_size: alone_size(in_chunk, target, device),
                         ..band
                     };
                     if !std::mem::take(&mut self.is_work_empty) {

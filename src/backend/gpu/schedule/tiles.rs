@@ -2,6 +2,7 @@
 
 use super::PIECES_MAX;
 use super::sizes::{ALONE_SIZE, Banding, DeviceTraits};
+use crate::backend::gpu::pipelines::SampleTarget;
 use crate::plan::DrawPlan;
 
 /// Sample tests that may be handed to the device without looking at how many it really is: a second
@@ -16,6 +17,10 @@ pub const HUGE_PX: u32 = 128;
 
 /// Fewer triangles than this in a dispatch leave most of a large GPU idle if each is drawn by one thread.
 const FEW_TRIANGLES: u32 = 1 << 15;
+
+/// The size of the largest triangle that a thread of a real GPU offers to mixed pixels by itself where there are few, 1/256
+/// px: each pixel has up to 256 points.
+const ALONE_SIZE_OF_POINTS: i32 = 256;
 
 /// No more triangles than this in a dispatch are drawn by workgroups alone, without a work list.
 const FEWEST_TRIANGLES: u32 = 1 << 12;
@@ -100,8 +105,13 @@ impl Tiles {
 }
 
 /// The size of the largest triangle of so many that a thread draws by itself, 1/256 px.
-pub fn alone_size(count: u32, device: &DeviceTraits) -> i32 {
-    if count < FEW_TRIANGLES { device.alone_size_of_few } else { ALONE_SIZE }
+pub fn alone_size(count: u32, target: SampleTarget, device: &DeviceTraits) -> i32 {
+    let is_hardware = device.alone_size_of_few < ALONE_SIZE;
+    match target {
+        _ if count >= FEW_TRIANGLES => ALONE_SIZE,
+        SampleTarget::Points if is_hardware => ALONE_SIZE_OF_POINTS,
+        _ => device.alone_size_of_few,
+    }
 }
 
 #[cfg(test)]
@@ -112,8 +122,11 @@ mod tests {
     #[test]
     fn few_triangles_keep_a_real_gpu_busy() {
         let real = DeviceTraits { alone_size_of_few: 1024, ..DEVICE };
-        let sizes = [(968, &real), (1 << 20, &real), (968, &DEVICE)].map(|(count, device)| alone_size(count, device));
-        assert_eq!(sizes, [1024, 4096, 4096]);
+        let sizes = |target: SampleTarget| {
+            [(968, &real), (1 << 20, &real), (968, &DEVICE)].map(|(count, device)| alone_size(count, target, device))
+        };
+        assert_eq!(sizes(SampleTarget::Visibility), [1024, 4096, 4096]);
+        assert_eq!(sizes(SampleTarget::Points), [256, 4096, 4096]);
     }
 
     #[test]
