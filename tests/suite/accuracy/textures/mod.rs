@@ -1,10 +1,13 @@
-//! Textures that are seen from far and at a slant, against the mean over each pixel.
+//! Textures that are seen from far and at a slant, against the mean over each pixel. Other kinds: [`kinds`].
+
+mod kinds;
 
 use image::{DynamicImage, GrayImage, ImageFormat};
 use meshsnap::backend::Renderer;
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
+use meshsnap::spec::Spec;
 
 use crate::oracle::surface::srgb;
 use crate::oracle::surface::texture::{Grey, trilinear};
@@ -63,7 +66,7 @@ fn floors_are_the_mean_over_their_pixels() {
             assert!(count > 1000 || !is_low, "{view_name}: {count} pixels at a slant");
             compared += count;
             for renderer in &mut renderers {
-                let image = draw(&mesh, view, renderer.as_mut());
+                let image = draw(&mesh, view, &[("style", "unlit"), ("samples", "1")], renderer.as_mut());
                 let error = |pixel: &Pixel| f64::from(image.pixel(pixel.at[0], pixel.at[1])[0]) - pixel.truth;
                 let now = rmse(pixels.iter().filter(slanted).map(error));
                 let all = rmse(pixels.iter().map(error));
@@ -104,7 +107,13 @@ struct Pixel {
 
 impl View {
     /// Where a point of the picture lies in the texture; None beside the floor.
-    fn place(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+    fn place(&self, point: [f64; 2]) -> Option<[f64; 2]> {
+        let at = self.floor_at(point).filter(|at| at.iter().all(|v| v.abs() < HALF));
+        at.map(|at| at.map(|v| (v + HALF) / (2.0 * HALF) * REPEATS))
+    }
+
+    /// The x and z that a point of the picture shows of the plane y = 0; None above the horizon.
+    fn floor_at(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let sub = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
         let unit = |a: [f64; 3]| a.map(|v| v / (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]).sqrt());
         let cross = |a: [f64; 3], b: [f64; 3]| {
@@ -118,9 +127,15 @@ impl View {
         let [across, down] = [(x - f64::from(WIDTH) / 2.0) * scale, (y - f64::from(HEIGHT) / 2.0) * scale];
         let ray: [f64; 3] = std::array::from_fn(|k| forward[k] + across * right[k] - down * up[k]);
         let t = -self.eye[1] / ray[1];
-        let [at_x, at_z] = [self.eye[0] + t * ray[0], self.eye[2] + t * ray[2]];
-        let is_on = t > 0.0 && at_x.abs() < HALF && at_z.abs() < HALF;
-        is_on.then(|| [at_x, at_z].map(|v| (v + HALF) / (2.0 * HALF) * REPEATS))
+        (t > 0.0).then(|| [self.eye[0] + t * ray[0], self.eye[2] + t * ray[2]])
+    }
+
+    /// A request that looks from here.
+    fn spec(&self, look: &[(&str, &str)]) -> Spec {
+        let text = |v: [f64; 3]| v.map(|v| v.to_string()).join(",");
+        let (eye, target, size) = (text(self.eye), text(self.target), format!("{WIDTH}x{HEIGHT}"));
+        let camera = [("size", &size[..]), ("camera.eye", &eye), ("camera.target", &target), ("camera.fov_deg", "60")];
+        scenes::spec(&[look, &camera].concat())
     }
 
     /// The pixels that show nothing but the floor, and more than one texel of it.
@@ -179,18 +194,8 @@ fn floor(picture: &[u8]) -> Mesh {
     model(&faces.map(|face| face.map(|v| corners[v])), &faces.map(|face| face.map(|v| uvs[v])), picture, base())
 }
 
-fn draw(mesh: &Mesh, view: &View, renderer: &mut dyn Renderer) -> Image {
-    let text = |v: [f64; 3]| v.map(|v| v.to_string()).join(",");
-    let (eye, target, size) = (text(view.eye), text(view.target), format!("{WIDTH}x{HEIGHT}"));
-    let keys = [
-        ("style", "unlit"),
-        ("size", &size),
-        ("samples", "1"),
-        ("camera.eye", &eye),
-        ("camera.target", &target),
-        ("camera.fov_deg", "60"),
-    ];
-    renderer.draw(&scenes::plan(mesh, &scenes::spec(&keys)), &Deadline::default()).unwrap()
+fn draw(mesh: &Mesh, view: &View, look: &[(&str, &str)], renderer: &mut dyn Renderer) -> Image {
+    renderer.draw(&scenes::plan(mesh, &view.spec(look)), &Deadline::default()).unwrap()
 }
 
 fn rmse(errors: impl Iterator<Item = f64>) -> f64 {

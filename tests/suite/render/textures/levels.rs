@@ -11,8 +11,18 @@ use meshsnap::mesh::Mesh;
 use meshsnap::plan::{DrawPlan, PlanError, SkipKind, TEXTURE_NONE, Texture, Textures, slots};
 use serde_json::{Value, json};
 
-/// Triangles with texture coordinates, and one material with one image.
+/// Triangles with texture coordinates, and one material with one image that repeats.
 pub fn model(corners: &[[[f32; 3]; 3]], uvs: &[[[f32; 2]; 3]], image: &[u8], material: Value) -> Mesh {
+    sampled_model(corners, uvs, image, [material, json!({})])
+}
+
+/// The same with this material and this sampler.
+pub fn sampled_model(
+    corners: &[[[f32; 3]; 3]],
+    uvs: &[[[f32; 2]; 3]],
+    image: &[u8],
+    [material, sampler]: [Value; 2],
+) -> Mesh {
     let mut gltf = Gltf::default();
     let p = gltf.floats("VEC3", corners.as_flattened().as_flattened());
     let t = gltf.floats("VEC2", uvs.as_flattened().as_flattened());
@@ -21,7 +31,8 @@ pub fn model(corners: &[[[f32; 3]; 3]], uvs: &[[[f32; 2]; 3]], image: &[u8], mat
     gltf.json["nodes"] = json!([{ "mesh": 0 }]);
     // A word for it that is a lie.
     gltf.json["images"] = json!([{ "bufferView": view, "mimeType": "image/vnd.radiance" }]);
-    gltf.json["textures"] = json!([{ "source": 0 }]);
+    gltf.json["samplers"] = json!([sampler]);
+    gltf.json["textures"] = json!([{ "source": 0, "sampler": 0 }]);
     gltf.json["materials"] = json!([material]);
     read(&gltf.glb()).unwrap().mesh
 }
