@@ -42,7 +42,7 @@ fn an_answer_says_what_was_chosen_and_what_error_to_expect() {
     assert_eq!(chosen, "image.samples=1, backend=cpu");
     let (error, chosen) = said(&post("image.max_time_ms=60000"));
     assert!(error < flat_error, "{error}");
-    assert_eq!(chosen, "image.samples=16, backend=cpu");
+    assert_eq!(chosen, "image.samples=adaptive, backend=cpu");
 
     let mut without = 0;
     for query in ["style=wire", "max_error=null", "samples=1"] {
