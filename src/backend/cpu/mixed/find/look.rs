@@ -154,7 +154,7 @@ impl Look {
     }
 }
 
-/// Pairs of faces that were compared last, and the looks that were made for it: neighbouring pixels show the same ones.
+/// Pairs of faces that were compared last, and the looks that were made last: neighbouring pixels show the same ones.
 pub struct Pairs {
     steps: [Pair; Pairs::STEPS],
     /// Id and look of a face.
@@ -198,7 +198,7 @@ impl Pairs {
         let looks = [a, b].map(|id| self.look(context, id));
         match looks[0].step_to(&looks[1]) {
             Step::None => Step::None,
-            // Of linked ones all goes on but the normal, which has been compared.
+            // Links cannot lower this step: the normals were compared.
             step if looks.iter().all(Look::is_of_one_normal) => step,
             step => step.min(step_of_linked(context, a, b)),
         }
