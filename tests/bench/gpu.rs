@@ -4,6 +4,7 @@
 //!     cargo bench --bench gpu                              # bumpy tori of 70 k and 1 M triangles, 512 px
 //!     cargo bench --bench gpu -- --mesh bunny.obj --look flat --size 256 --workers 16 --rounds 200
 //!     cargo bench --bench gpu -- --samples adaptive
+//!     cargo bench --bench gpu -- --samples 4,16,adaptive --pause-ms 20    # in turns, as when pictures are asked for now and then
 //!     cargo bench --bench gpu -- --copy yes                # with a copy of each picture, as if none were read in place
 
 // A tool for developers: giving up loudly is fine.
@@ -16,15 +17,15 @@ mod meshes;
 use std::hint::black_box;
 use std::sync::Arc;
 use std::thread;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use meshes::MeshFile;
-use meshsnap::backend::Renderer as _;
 use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
+use meshsnap::backend::{DrawTimes, Renderer as _};
 use meshsnap::import::{self, Bundle};
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::Mesh;
-use meshsnap::plan::{self, Prepared};
+use meshsnap::plan::{self, DrawPlan, Prepared};
 use meshsnap::request::{self, Rules};
 use meshsnap::scene::Scene;
 use meshsnap::spec::BackendChoice;
@@ -34,7 +35,7 @@ const LOOKS: [&str; 4] = ["flat", "auto", "wire", "outline"];
 fn main() {
     let (mut file, mut size, mut workers, mut rounds, mut copies) = (None, "512".to_owned(), 1, 60_usize, false);
     let mut looks = LOOKS.map(str::to_owned).to_vec();
-    let mut samples = "4".to_owned();
+    let (mut samples, mut pause) = ("4".to_owned(), Duration::ZERO);
     let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
     while let Some(name) = arguments.next() {
         let value = arguments.next().unwrap_or_else(|| panic!("{name} needs a value"));
@@ -44,6 +45,7 @@ fn main() {
             "--workers" => workers = value.parse().expect("a number"),
             "--look" => looks = vec![value],
             "--samples" => samples = value,
+            "--pause-ms" => pause = Duration::from_millis(value.parse().expect("a number")),
             "--copy" => copies = value == "yes",
             "--rounds" => rounds = value.parse().expect("a number"),
             other => panic!("there is no option {other}"),
@@ -62,7 +64,7 @@ fn main() {
     for file in files {
         let mesh = read(&file);
         for look in &looks {
-            measure(&gpu, (&file.name, &mesh), (look, &size, &samples), (workers, rounds.max(1)), copies);
+            measure(&gpu, (&file.name, &mesh), (look, &size, &samples), (workers, rounds.max(1)), (copies, pause));
         }
     }
 }
@@ -77,25 +79,32 @@ fn read(file: &MeshFile) -> Mesh {
     import::import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap().mesh
 }
 
-/// Draws one look of a mesh `rounds` times on each worker, and prints a line.
+/// Draws one look of a mesh `rounds` times on each worker, with each number of samples in turns, and prints a line for each.
 fn measure(
     gpu: &Arc<Gpu>,
     (name, mesh): (&str, &Mesh),
     (look, size, samples): (&str, &str, &str),
     (workers, rounds): (usize, usize),
-    copies: bool,
+    (copies, pause): (bool, Duration),
 ) {
     let limits = Limits { memory_bytes: 16 << 30, ..Limits::default() };
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
-    let keys = [("style", look), ("size", size), ("view", "iso"), ("samples", samples)];
-    let keys = keys.map(|(key, value)| (key.to_owned(), value.to_owned()));
-    let spec = request::read(None, &keys, &Rules { limits: limits.clone(), backend: BackendChoice::Gpu }).unwrap();
-    let scene = Scene::new(mesh, &spec, &mut budget).unwrap();
+    let rules = Rules { limits: limits.clone(), backend: BackendChoice::Gpu };
+    let counts: Vec<&str> = samples.split(',').collect();
+    let spec = |count: &&str| {
+        let keys = [("style", look), ("size", size), ("view", "iso"), ("samples", *count)];
+        let keys = keys.map(|(key, value)| (key.to_owned(), value.to_owned()));
+        request::read(None, &keys, &rules).unwrap()
+    };
+    let specs: Vec<_> = counts.iter().map(spec).collect();
+    let scenes: Vec<_> = specs.iter().map(|spec| Scene::new(mesh, spec, &mut budget).unwrap()).collect();
     let prepared = Prepared::default();
-    let plan = plan::build_from(&scene, &prepared, &mut budget, &deadline).unwrap();
-    let draw = |renderer: &mut GpuRenderer| {
+    let plans: Vec<_> =
+        scenes.iter().map(|scene| plan::build_from(scene, &prepared, &mut budget, &deadline).unwrap()).collect();
+    let draw = |renderer: &mut GpuRenderer, plan: &DrawPlan<'_>| {
+        thread::sleep(pause);
         let began = Instant::now();
-        let image = renderer.draw(&plan, &deadline).unwrap();
+        let image = renderer.draw(plan, &deadline).unwrap();
         // As an encoder does.
         black_box(image.is_opaque());
         if copies {
@@ -103,25 +112,44 @@ fn measure(
         }
         ms(began)
     };
-    let first = draw(&mut GpuRenderer::new(gpu.clone()));
+    let first: Vec<f64> = plans.iter().map(|plan| draw(&mut GpuRenderer::new(gpu.clone()), plan)).collect();
     let all = Instant::now();
     let drawn = thread::scope(|scope| {
         let worker = || {
             let mut renderer = GpuRenderer::new(gpu.clone());
-            let least = (0..rounds).map(|_| draw(&mut renderer)).fold(f64::INFINITY, f64::min);
-            (least, renderer.draw_times())
+            let mut results = vec![(Vec::new(), DrawTimes::default()); plans.len()];
+            for _ in 0..rounds {
+                for (plan, (took, times)) in plans.iter().zip(&mut results) {
+                    took.push(draw(&mut renderer, plan));
+                    *times = renderer.draw_times();
+                }
+            }
+            results
         };
         let workers: Vec<_> = (0..workers).map(|_| scope.spawn(worker)).collect();
         workers.into_iter().map(|worker| worker.join().unwrap()).collect::<Vec<_>>()
     });
-    let rate = (workers * rounds) as f64 / all.elapsed().as_secs_f64();
-    let (least, times) = drawn.first().expect("a worker");
+    let rate = (workers * rounds * plans.len()) as f64 / all.elapsed().as_secs_f64();
+    for ((count, first), (took, times)) in counts.iter().zip(first).zip(drawn.into_iter().next().expect("a worker")) {
+        println!(
+            "{name}, {look}, samples {count}: first {first:.0} ms, {}, {rate:.0}/s; {}",
+            spread(took),
+            stages(&times)
+        );
+    }
+}
+
+/// The least and the median of times.
+fn spread(mut took_ms: Vec<f64>) -> String {
+    took_ms.sort_by(f64::total_cmp);
+    format!("least {:.2} ms, median {:.2} ms", took_ms[0], took_ms[took_ms.len() / 2])
+}
+
+/// The times of stages on the device.
+fn stages(times: &DrawTimes) -> String {
     let parts: Vec<String> =
         times.parts().map(|(stage, took)| format!("{} {:.3}", stage.name(), took.as_secs_f64() * 1e3)).collect();
     let mixed = if times.mixed_pixels > 0 { format!("; {} mixed pixels", times.mixed_pixels) } else { String::new() };
     let device: f64 = times.parts().map(|(_, took)| took.as_secs_f64() * 1e3).sum();
-    println!(
-        "{name}, {look}, samples {samples}: first {first:.0} ms, least {least:.2} ms, {rate:.0}/s; device {device:.3} ms: {}{mixed}",
-        parts.join(", ")
-    );
+    format!("device {device:.3} ms: {}{mixed}", parts.join(", "))
 }
