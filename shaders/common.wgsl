@@ -118,9 +118,9 @@ struct Batch {
     // Numbers of the first mixed pixel whose points the buffer holds, and of the one after the last.
     slots_first: u32,
     slots_end: u32,
-    // Gangs have an array of batches, whose size must be a multiple of 16 bytes.
-    padding_a: u32,
-    padding_b: u32,
+    // Items of the lists of mixed pixels, and parts of their colours, that there is room for.
+    list_capacity: u32,
+    part_capacity: u32,
 };
 
 // Threads of a workgroup, in every kernel.

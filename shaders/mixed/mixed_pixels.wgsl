@@ -30,6 +30,7 @@ fn mixed_pixels(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_work
     let number = atomicAdd(&mixed[0], 1u);
     atomicStore(&mixed[number_at(i)], (number + 1u) | few);
     atomicStore(&mixed[pixel_at(number)], i | few);
+    atomicStore(&mixed[list_at(number)], LIST_END);
 }
 
 fn breaks_in(pixel: vec2<i32>) -> u32 {

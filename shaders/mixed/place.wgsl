@@ -1,14 +1,28 @@
 // Stage mixed: the buffer of a band's mixed pixels. The CPU's is MixedPixels in src/backend/cpu/mixed/find/mod.rs.
 //
 // Its words:
-// - their number, and three unused words
+// - their number; 1 if there was no room for all lists; and the numbers of items of lists and of parts
 // - by pixel of the band: 1 more than its number among them, or 0; with FEW where few points are enough
 // - by number: the pixel, with FEW likewise
 // - by pixel, and one more on each side: the places where colours break off
+// - by number: the first item of the pixel's list of triangles, or LIST_END
+// - by number: the first of the pixel's parts, times PARTS_OF_PIXEL, and how many they are
+// - by item: the next one, or LIST_END
 // - by number, where lines are drawn: the points that see something, as stroke.wgsl numbers them; none where all do, or few
 //   points were enough
 
 const HEAD_WORDS: u32 = 4u;
+
+// Indices of words of the head.
+const OVERFLOW: u32 = 1u;
+const ITEM_COUNT: u32 = 2u;
+const PART_COUNT: u32 = 3u;
+
+// The end of a list.
+const LIST_END: u32 = 0xFFFFFFFFu;
+
+// More than the parts of a pixel.
+const PARTS_OF_PIXEL: u32 = 512u;
 
 // Words of a pixel's points.
 const BORDER_WORDS: u32 = 8u;
@@ -30,10 +44,30 @@ fn pixel_at(number: u32) -> u32 {
     return HEAD_WORDS + band_pixels() + number;
 }
 
+// Index of the word that has the first item of the list of the pixel of this number.
+fn list_at(number: u32) -> u32 {
+    let around = u32((frame.width + 2) * (batch.row_end - batch.row_first + 2));
+    return HEAD_WORDS + 2u * band_pixels() + around + number;
+}
+
+// Index of the word that has the parts of the pixel of this number.
+fn parts_at(number: u32) -> u32 {
+    return list_at(band_pixels() + number);
+}
+
+// Index of the word that has the item after this one.
+fn next_at(item: u32) -> u32 {
+    return list_at(2u * band_pixels() + item);
+}
+
 // Index of the first word of the points of the pixel of this number.
 fn border_at(number: u32) -> u32 {
-    let around = u32((frame.width + 2) * (batch.row_end - batch.row_first + 2));
-    return HEAD_WORDS + 2u * band_pixels() + around + BORDER_WORDS * number;
+    return next_at(batch.list_capacity + BORDER_WORDS * number);
+}
+
+// Index of the first vector of a part in the buffer of lists, where parts follow the items.
+fn part_at(i: u32) -> u32 {
+    return ITEM_VECTORS * batch.list_capacity + 2u * i;
 }
 
 // Index of the word with the breaks of a pixel, of the band or beside it.

@@ -51,14 +51,7 @@ fn draw_points(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
 
 // Offers a triangle to point i of a pixel whose edge functions are c; start: the pixel's corner, seen from the triangle's first.
 fn draw_point(s: Setup, e: Edges, c: vec3<i32>, start: vec2<i32>, i: u32, first: u32, id: u32) {
-    let place = point_place(i);
-    let value = c + e.dx * place.y - e.dy * place.x;
-    if (value.x | value.y | value.z) < 0 {
-        return;
-    }
-    let p = rn2(vec2<f32>(2 * (start + place) + 1) * 0.5);
-    let plane = rn(s.depth.x + rn(s.depth.y * p.x)) + rn(s.depth.z * p.y);
-    let z = min(max(plane, s.depth_range.x), s.depth_range.y);
+    let z = depth_at_point(s, e, c, start, i);
     if z > 0.0 {
         keep_nearest(first + i, z, id);
     }

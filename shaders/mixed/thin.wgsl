@@ -14,13 +14,56 @@ const LENGTH_MIN: i32 = 256;
 // Triangles of this length, 1/256 px, that are less than HEIGHT_MAX high are ASPECT times as long in any case.
 const LENGTH_MAX: i32 = 32768;
 
+// The workgroup's thin triangles, and how many steps there are along them, up to each. A step is a column or row of pixels:
+// threads take one after the other, because a few triangles may have most of them.
+var<workgroup> thin_count: atomic<u32>;
+var<workgroup> thin_ids: array<u32, WORKGROUP>;
+var<workgroup> ends: array<u32, WORKGROUP>;
+var<workgroup> step_count: u32;
+
 @compute @workgroup_size(WORKGROUP)
-fn thin(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = gid.x + gid.y * groups.x * WORKGROUP;
-    if i >= batch.count {
-        return;
+fn thin(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    let i = (workgroup.x + workgroup.y * groups.x) * WORKGROUP + thread;
+    if thread == 0u {
+        atomicStore(&thin_count, 0u);
     }
-    let t = batch.first + i;
+    workgroupBarrier();
+    if i < batch.count {
+        find_steps(batch.first + i);
+    }
+    workgroupBarrier();
+    if thread == 0u {
+        step_count = 0u;
+        for (var n = 0u; n < atomicLoad(&thin_count); n++) {
+            step_count += ends[n];
+            ends[n] = step_count;
+        }
+    }
+    let count = workgroupUniformLoad(&step_count);
+    var n = 0u;
+    for (var step = thread; step < count; step += WORKGROUP) {
+        // Steps of a thread go up, and so do the triangles that they are of.
+        while step >= ends[n] {
+            n++;
+        }
+        var before = 0u;
+        if n > 0u {
+            before = ends[n - 1u];
+        }
+        let t = thin_ids[n];
+        let a = corner_on_screen(t, 0u);
+        let b = corner_on_screen(t, 1u);
+        let c = corner_on_screen(t, 2u);
+        take_step(setup_of(a, b, c, area_of(a, b, c)), t, i32(step - before));
+    }
+}
+
+// Puts a triangle among the thin ones if it is one, with the number of its steps.
+fn find_steps(t: u32) {
     let a = corner_on_screen(t, 0u);
     let b = corner_on_screen(t, 1u);
     let c = corner_on_screen(t, 2u);
@@ -31,7 +74,13 @@ fn thin(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) 
     if !passes_culling(t, area) || !is_thin(vec3(a.x, b.x, c.x), vec3(a.y, b.y, c.y), area) {
         return;
     }
-    follow(setup_of(a, b, c, area), t);
+    let way = way_along(setup_of(a, b, c, area));
+    let steps = way.last[way.axis] - way.first[way.axis] + 1;
+    if !way.is_empty && steps > 0 {
+        let n = atomicAdd(&thin_count, 1u);
+        thin_ids[n] = t;
+        ends[n] = u32(steps);
+    }
 }
 
 fn is_thin(x: vec3<i32>, y: vec3<i32>, area: vec2<u32>) -> bool {
@@ -47,40 +96,54 @@ fn is_thin(x: vec3<i32>, y: vec3<i32>, area: vec2<u32>) -> bool {
     return length >= LENGTH_MAX || ASPECT * bitcast<i32>(positive.x) <= length * length;
 }
 
-// Marks the pixels that a triangle touches.
-fn follow(s: Setup, id: u32) {
+// The pixels of the band that a triangle's box touches, and the axis along its longer side: 0 for columns, 1 for rows.
+struct Way {
+    first: vec2<i32>,
+    last: vec2<i32>,
+    low: vec2<i32>,
+    high: vec2<i32>,
+    axis: u32,
+    is_empty: bool,
+};
+
+fn way_along(s: Setup) -> Way {
     let half = vec2(frame.width, frame.height) * 128;
     let x = s.x + half.x;
     let y = s.y + half.y;
     let low = vec2(min(min(x.x, x.y), x.z), min(min(y.x, y.y), y.z));
     let high = vec2(max(max(x.x, x.y), x.z), max(max(y.x, y.y), y.z));
-    // Points lie in the middle of 1/256 px, so there is none where low is high.
-    if any(low >= high) {
-        return;
-    }
     let first = max(low >> vec2(8u), vec2(0, batch.row_first));
     let last = min((high - 1) >> vec2(8u), vec2(frame.width, batch.row_end) - 1);
-    let is_upright = high.x - low.x < high.y - low.y;
+    let axis = select(0u, 1u, high.x - low.x < high.y - low.y);
+    // Points lie in the middle of 1/256 px, so there is none where low is high.
+    return Way(first, last, low, high, axis, any(low >= high));
+}
+
+// Marks the pixels that a triangle touches in the step-th column or row.
+fn take_step(s: Setup, id: u32, step: i32) {
+    let half = vec2(frame.width, frame.height) * 128;
+    let x = s.x + half.x;
+    let y = s.y + half.y;
+    let way = way_along(s);
+    let is_upright = way.axis == 1u;
     // Along the longer side, and across it: its ends, and on which side of it the third corner lies.
     let along = select(x, y, is_upright);
     let across = select(y, x, is_upright);
-    let ends = vec2(select(low.x, low.y, is_upright), select(high.x, high.y, is_upright));
-    let start = corner_at(along, ends.x);
-    let end = corner_at(along, ends.y);
+    let ends_along = vec2(way.low[way.axis], way.high[way.axis]);
+    let start = corner_at(along, ends_along.x);
+    let end = corner_at(along, ends_along.y);
     let third = 3u - start - end;
-    let origin = vec2(ends.x, across[start]);
-    let slope = f32(across[end] - origin.y) / f32(ends.y - ends.x);
+    let origin = vec2(ends_along.x, across[start]);
+    let slope = f32(across[end] - origin.y) / f32(ends_along.y - ends_along.x);
     let aside = across[third] - line_at(origin, slope, along[third]);
     let slack = i32(128.0 * abs(slope)) + SLACK;
     let e = edges_of(s);
-    let steps = select(vec2(first.x, last.x), vec2(first.y, last.y), is_upright);
-    let sides = select(vec2(first.y, last.y), vec2(first.x, last.x), is_upright);
-    for (var step = steps.x; step <= steps.y; step++) {
-        let middle = line_at(origin, slope, clamp(256 * step + 128, ends.x, ends.y));
-        let beside_last = min((middle + max(aside, 0) + slack) >> 8u, sides.y);
-        for (var beside = max((middle + min(aside, 0) - slack) >> 8u, sides.x); beside <= beside_last; beside++) {
-            mark(s, e, select(vec2(step, beside), vec2(beside, step), is_upright), id);
-        }
+    let sides = vec2(way.first[1u - way.axis], way.last[1u - way.axis]);
+    let place = way.first[way.axis] + step;
+    let middle = line_at(origin, slope, clamp(256 * place + 128, ends_along.x, ends_along.y));
+    let beside_last = min((middle + max(aside, 0) + slack) >> 8u, sides.y);
+    for (var beside = max((middle + min(aside, 0) - slack) >> 8u, sides.x); beside <= beside_last; beside++) {
+        mark(s, e, select(vec2(place, beside), vec2(beside, place), is_upright), id);
     }
 }
 

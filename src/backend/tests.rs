@@ -165,6 +165,12 @@ const SHADER_ONLY: &[&str] = &[
     "SLACK_WORD",
     "HOLE_WORD",
     "FEW",
+    "OVERFLOW",
+    "ITEM_COUNT",
+    "PART_COUNT",
+    "LIST_END",
+    "LIST_MAX",
+    "PARTS_OF_PIXEL",
     "STEP_NONE",
     "STEP_SLIGHT",
     "STEP_HARD",
@@ -184,12 +190,16 @@ fn kernels() -> Vec<Kernel> {
     ];
     all.extend([Kernel::Holes, Kernel::LineLight, Kernel::Resolve, Kernel::Paint]);
     all.extend([Kernel::Breaks, Kernel::Thin, Kernel::MixedPixels, Kernel::MixedColor]);
+    all.extend([Kernel::MixedParts, Kernel::MixedShade, Kernel::MixedSum]);
     for write in [SampleWrite::Both, SampleWrite::Depth, SampleWrite::Id] {
         all.push(Kernel::VisibilityFew { write });
         for target in [SampleTarget::Visibility, SampleTarget::Layer, SampleTarget::Points] {
             all.extend([Kernel::Visibility { write, target }, Kernel::VisibilityTile { write, target }]);
         }
     }
+    // Lists take depth and id together.
+    let (write, target) = (SampleWrite::Both, SampleTarget::Lists);
+    all.extend([Kernel::Visibility { write, target }, Kernel::VisibilityTile { write, target }]);
     all
 }
 
@@ -274,7 +284,7 @@ fn layouts() -> Vec<(&'static str, Layout)> {
                 first count faces row_first row_end capacity large_first large_end huge_first huge_end edges_per_group
                 line_width line_smoothing line_flags line_exponent line_windows line_slices line_peak line_units
                 line_pass seen_first seen_end samples_at pass_bit layer column_first column_end seen_margin
-                alone_size groups_each cleared rgba_at slots_first slots_end padding_a padding_b
+                alone_size groups_each cleared rgba_at slots_first slots_end list_capacity part_capacity
             }),
         ),
         (

@@ -206,31 +206,41 @@ impl GpuRenderer {
             Some(Drawn::Alone(leading)) => Some(leading),
             None => None,
         };
-        let (rgba, times) = self.draw_alone(plan, deadline, drawing.is_alone)?;
+        let (rgba, times) = match self.draw_alone(plan, deadline, drawing.is_alone, true)? {
+            Some(drawn) => drawn,
+            None => {
+                tracing::debug!("mixed pixels have more triangles than their lists have room for");
+                let drawn = self.draw_alone(plan, deadline, drawing.is_alone, false)?;
+                drawn.ok_or_else(|| DrawError::Device("it found no room where none is needed".to_owned()))?
+            }
+        };
         drop(leading);
         self.draw_times = times;
         Ok(Image { rgba, ..image })
     }
 
-    /// A picture's pixels, drawn with buffers of its own, and the times of its stages if they are asked for.
+    /// A picture's pixels, drawn with buffers of its own, and the times of its stages if they are asked for. None if mixed
+    /// pixels were to have lists and there was no room for them.
     fn draw_alone(
         &self,
         plan: &DrawPlan<'_>,
         deadline: &Deadline,
         is_timed: bool,
-    ) -> Result<(Pixels, DrawTimes), DrawError> {
+        lists_mixed: bool,
+    ) -> Result<Option<(Pixels, DrawTimes)>, DrawError> {
         let row_bytes = u64::from(plan.width_px) * 4;
         let size = row_bytes * u64::from(plan.height_px);
         let times_at = size.next_multiple_of(8);
         let counts_at = times_at + StageClock::BYTES;
-        // A number of mixed pixels for each band, and no band is empty.
-        let counts_end = counts_at + if plan.has_mixed() { 4 * u64::from(plan.height_px) } else { 0 };
+        // For each band the number of mixed pixels, and whether there was no room for their lists. No band is empty.
+        let counts_end = counts_at + if plan.has_mixed() { 8 * u64::from(plan.height_px) } else { 0 };
         self.job(|gpu, buffers| {
             let staging = buffers.staging(&gpu.handles, counts_end)?.clone();
             let device = traits(gpu);
             // Kernels write the bytes to where the CPU reads them, if they can.
             let maps_pictures = gpu.handles.maps_storage && staging.size() <= device.binding_bytes_max;
-            let schedule = Schedule::new(plan, &DeviceTraits { maps_pictures, ..device }, Goal::Picture)?;
+            let device = DeviceTraits { maps_pictures, lists_mixed, ..device };
+            let schedule = Schedule::new(plan, &device, Goal::Picture)?;
             gpu.make_pipelines(&schedule.kernels(), pipeline_key(plan))?;
             upload_geometry(gpu, buffers, plan, &schedule)?;
             upload_shading(gpu, buffers, plan, &schedule)?;
@@ -247,7 +257,7 @@ impl GpuRenderer {
             let mut counts = 0;
             execute(&mut recorder, plan, &schedule, |recorder, Band { rows: [first, end] }| {
                 if plan.has_mixed() {
-                    recorder.copy_out(Slot::Mixed, 0, 4, counts_at + 4 * counts)?;
+                    recorder.copy_out(Slot::Mixed, 0, 8, counts_at + 8 * counts)?;
                     counts += 1;
                 }
                 if !maps_pictures {
@@ -259,13 +269,18 @@ impl GpuRenderer {
                 }
                 recorder.submit()
             })?;
-            let read = if is_timed || counts > 0 { counts_at + 4 * counts } else { times_at };
+            let read = if is_timed || counts > 0 { counts_at + 8 * counts } else { times_at };
             let mapped = Arc::new(recorder.take_staging(read)?);
             let (times, counts) =
                 mapped.bytes()[times_at as usize..].split_at((read.min(counts_at) - times_at) as usize);
             let mut times = recorder.times(times);
-            times.mixed_pixels = counts.as_chunks().0.iter().map(|count| u64::from(u32::from_le_bytes(*count))).sum();
-            Ok((Mapped::pixels(&mapped, 0..size as usize), times))
+            let (counts, _) = counts.as_chunks::<8>();
+            let words = counts.iter().map(|words| bytemuck::pod_read_unaligned::<[u32; 2]>(words));
+            if words.clone().any(|[_, is_full]| is_full != 0) {
+                return Ok(None);
+            }
+            times.mixed_pixels = words.map(|[count, _]| u64::from(count)).sum();
+            Ok(Some((Mapped::pixels(&mapped, 0..size as usize), times)))
         })
     }
 }
@@ -324,6 +339,7 @@ fn traits(gpu: &Gpu) -> DeviceTraits {
         maps_pictures: false,
         int64_atomics: gpu.int64_atomics,
         loops_are_limited: gpu.is_software(),
+        lists_mixed: true,
     }
 }
 
@@ -396,6 +412,7 @@ fn upload_shading(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedul
     }
     if plan.has_mixed() {
         buffers.reserve(&gpu.handles, Slot::Mixed, schedule.banding.mixed_bytes(plan))?;
+        buffers.reserve(&gpu.handles, Slot::Lists, schedule.banding.lists_bytes(plan))?;
         // It is all zeros when a job begins: mixed_color.wgsl clears what it reads, a new buffer is clear, and a job that
         // fails does not give its buffers back.
         buffers.reserve(&gpu.handles, Slot::Points, schedule.banding.points_bytes(plan))?;

@@ -117,8 +117,8 @@ pub struct Batch {
     pub rgba_at: u32,
     pub slots_first: u32,
     pub slots_end: u32,
-    pub padding_a: u32,
-    pub padding_b: u32,
+    pub list_capacity: u32,
+    pub part_capacity: u32,
 }
 
 /// Bits of [`Batch::line_flags`].

@@ -16,10 +16,15 @@ impl Kernel {
             Self::Visibility { target: SampleTarget::Layer, .. } => VISIBILITY_OF_LAYER,
             Self::Visibility { target: SampleTarget::Points, .. } => VISIBILITY_OF_POINTS,
             Self::VisibilityTile { target: SampleTarget::Points, .. } => TILE_OF_POINTS,
+            Self::Visibility { target: SampleTarget::Lists, .. } => VISIBILITY_OF_LISTS,
+            Self::VisibilityTile { target: SampleTarget::Lists, .. } => TILE_OF_LISTS,
             Self::Breaks => BREAKS,
             Self::Thin => THIN,
             Self::MixedPixels => MIXED_PIXELS,
             Self::MixedColor => MIXED_COLOR,
+            Self::MixedParts => MIXED_PARTS,
+            Self::MixedShade => MIXED_SHADE,
+            Self::MixedSum => MIXED_SUM,
             Self::Clip => CLIP,
             Self::VisibilityTile { target: SampleTarget::Visibility, .. } => TILE,
             Self::VisibilityTile { target: SampleTarget::Layer, .. } => TILE_OF_LAYER,
@@ -94,6 +99,16 @@ const VISIBILITY_OF_POINTS: &[Binding] = &[
     (Slot::Mixed, Read),
 ];
 
+const VISIBILITY_OF_LISTS: &[Binding] = &[
+    (Slot::Triangles, Read),
+    (Slot::PassMasks, Read),
+    (Slot::Vertices, Read),
+    (Slot::Work, ReadWrite),
+    (Slot::PeelRounds, Read),
+    (Slot::Mixed, ReadWrite),
+    (Slot::Lists, ReadWrite),
+];
+
 const CLIP: &[Binding] = &[
     (Slot::Positions, Read),
     (Slot::Triangles, Read),
@@ -117,6 +132,8 @@ const TILE_OF_LAYER: &[Binding] =
     &[(Slot::Samples, ReadWrite), (Slot::Work, Read), (Slot::PeelLayer, Read), (Slot::PeelState, Read)];
 
 const TILE_OF_POINTS: &[Binding] = &[(Slot::Samples, ReadWrite), (Slot::Work, Read), (Slot::Mixed, Read)];
+
+const TILE_OF_LISTS: &[Binding] = &[(Slot::Work, Read), (Slot::Mixed, ReadWrite), (Slot::Lists, ReadWrite)];
 
 const BREAKS: &[Binding] = &[
     (Slot::Positions, Read),
@@ -174,6 +191,29 @@ const MIXED_COLOR: &[Binding] = &[
     (Slot::Mixed, ReadWrite),
     (Slot::Points, ReadWrite),
 ];
+
+const MIXED_PARTS: &[Binding] = &[(Slot::Mixed, ReadWrite), (Slot::Lists, ReadWrite)];
+
+const MIXED_SHADE: &[Binding] = &[
+    (Slot::Positions, Read),
+    (Slot::Triangles, Read),
+    (Slot::Vertices, Read),
+    (Slot::Samples, Read),
+    (Slot::Normals, Read),
+    (Slot::CornerTriangles, Read),
+    (Slot::Attributes, Read),
+    (Slot::Materials, Read),
+    (Slot::FaceNormals, Read),
+    (Slot::HullMaterials, Read),
+    (Slot::Uvs, Read),
+    (Slot::VertexColors, Read),
+    (Slot::Texels, Read),
+    (Slot::Occlusion, Read),
+    (Slot::Mixed, Read),
+    (Slot::Lists, ReadWrite),
+];
+
+const MIXED_SUM: &[Binding] = &[(Slot::Colors, ReadWrite), (Slot::Mixed, Read), (Slot::Lists, Read)];
 
 const GRID: &[Binding] = &[(Slot::Samples, Read), (Slot::Occlusion, ReadWrite)];
 

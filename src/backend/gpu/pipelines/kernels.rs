@@ -39,6 +39,9 @@ const LOOK: &str = include_str!("../../../../shaders/mixed/look.wgsl");
 const POINT_EDGES: &str = include_str!("../../../../shaders/mixed/point_edges.wgsl");
 const MIXED_LATTICE: &str = include_str!("../../../../shaders/mixed/lattice.wgsl");
 const MIXED_POINTS: &str = include_str!("../../../../shaders/mixed/points.wgsl");
+const MIXED_LISTS: &str = include_str!("../../../../shaders/mixed/lists.wgsl");
+const SHARES: &str = include_str!("../../../../shaders/mixed/shares.wgsl");
+const SHARE_COLOR: &str = include_str!("../../../../shaders/mixed/share_color.wgsl");
 const HULL: &str = include_str!("../../../../shaders/surface/hull.wgsl");
 const GROUP: &str = include_str!("../../../../shaders/surface/group.wgsl");
 
@@ -72,6 +75,9 @@ impl Kernel {
             Self::Thin => "thin",
             Self::MixedPixels => "mixed_pixels",
             Self::MixedColor => "mixed_color",
+            Self::MixedParts => "mixed_parts",
+            Self::MixedShade => "mixed_shade",
+            Self::MixedSum => "mixed_sum",
             Self::Holes => "holes",
             Self::Edge => "edge",
             Self::Coverage => "coverage",
@@ -108,17 +114,20 @@ impl Kernel {
 
     fn own_source(self) -> String {
         let keep_nearest = |write: SampleWrite| if write == SampleWrite::Both { SAMPLES_64 } else { SAMPLES_32 };
-        // Where what is found goes, and what of a triangle is found: first of small ones, then in tiles.
-        let emit = |target: SampleTarget, by_size: &str| match target {
-            SampleTarget::Visibility => [SAMPLES, EMIT, by_size].concat(),
-            SampleTarget::Layer => [SAMPLES, PEEL_STATE, EMIT_LAYER, by_size].concat(),
-            SampleTarget::Points => [MIXED_PLACE, MIXED_LATTICE, POINT_EDGES, MIXED_POINTS].concat(),
+        // Where what is found goes and how, and what of a triangle is found: first of small ones, then in tiles.
+        let emit = |write: SampleWrite, target: SampleTarget, by_size: &str| match target {
+            SampleTarget::Visibility => [keep_nearest(write), SAMPLES, EMIT, by_size].concat(),
+            SampleTarget::Layer => [keep_nearest(write), SAMPLES, PEEL_STATE, EMIT_LAYER, by_size].concat(),
+            SampleTarget::Points => {
+                [keep_nearest(write), MIXED_PLACE, MIXED_LATTICE, POINT_EDGES, MIXED_POINTS].concat()
+            }
+            SampleTarget::Lists => [MIXED_PLACE, POINT_EDGES, MIXED_LISTS].concat(),
         };
         match self {
             Self::Transform => include_str!("../../../../shaders/geometry/transform.wgsl").to_owned(),
             Self::Visibility { write, target } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility.wgsl");
-                [TRIANGLE, CORNERS, CULLING, WORK, keep_nearest(write), &emit(target, SMALL), kernel].concat()
+                [TRIANGLE, CORNERS, CULLING, WORK, &emit(write, target, SMALL), kernel].concat()
             }
             Self::Clip => {
                 [TRIANGLE, CORNERS, CULLING, WORK, PLANES, include_str!("../../../../shaders/geometry/clip.wgsl")]
@@ -126,7 +135,7 @@ impl Kernel {
             }
             Self::VisibilityTile { write, target } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility_tile.wgsl");
-                [TRIANGLE, keep_nearest(write), &emit(target, TILE_SAMPLES), TILE, kernel].concat()
+                [TRIANGLE, &emit(write, target, TILE_SAMPLES), TILE, kernel].concat()
             }
             Self::Grid => [PLACE, include_str!("../../../../shaders/occlusion/grid.wgsl")].concat(),
             Self::Gather => [PLACE, include_str!("../../../../shaders/occlusion/gather.wgsl")].concat(),
@@ -156,6 +165,7 @@ impl Kernel {
             .concat()
             .concat(),
             Self::Breaks | Self::Thin | Self::MixedPixels | Self::MixedColor => self.mixed_source(),
+            Self::MixedParts | Self::MixedShade | Self::MixedSum => self.mixed_source(),
             Self::LineLight => {
                 [&[TRIANGLE], SHADE, &[include_str!("../../../../shaders/lines/line_light.wgsl")]].concat().concat()
             }
@@ -187,8 +197,17 @@ impl Kernel {
             }
             Self::MixedColor => {
                 let kernel = include_str!("../../../../shaders/mixed/mixed_color.wgsl");
-                &[HULL, PLACE, SPREAD, MIXED_PLACE, MIXED_LATTICE, kernel]
+                &[HULL, PLACE, SPREAD, MIXED_PLACE, MIXED_LATTICE, SHARES, SHARE_COLOR, kernel]
             }
+            Self::MixedShade => {
+                let kernel = include_str!("../../../../shaders/mixed/mixed_shade.wgsl");
+                &[HULL, PLACE, SPREAD, MIXED_PLACE, MIXED_LATTICE, SHARE_COLOR, kernel]
+            }
+            Self::MixedParts => {
+                let kernel = include_str!("../../../../shaders/mixed/mixed_parts.wgsl");
+                return [TRIANGLE, MIXED_PLACE, POINT_EDGES, MIXED_LATTICE, SHARES, kernel].concat();
+            }
+            Self::MixedSum => return [MIXED_PLACE, include_str!("../../../../shaders/mixed/mixed_sum.wgsl")].concat(),
             // Numbers of pixels alone.
             _ => return [MIXED_PLACE, include_str!("../../../../shaders/mixed/mixed_pixels.wgsl")].concat(),
         };
@@ -217,12 +236,15 @@ impl Kernel {
                 key::SAMPLES | key::PASS_MASKS | key::PEELING | key::BEHIND_SURFACE
             }
             Self::VisibilityTile { target: SampleTarget::Visibility, .. } => key::SAMPLES | key::GANG,
-            Self::Visibility { target: SampleTarget::Points, .. } => key::PASS_MASKS,
-            Self::VisibilityTile { target: SampleTarget::Points, .. } => 0,
+            Self::Visibility { target: SampleTarget::Points | SampleTarget::Lists, .. } => key::PASS_MASKS,
+            Self::VisibilityTile { target: SampleTarget::Points | SampleTarget::Lists, .. } => 0,
             Self::Breaks => SHADED,
             Self::Thin => SHADED | key::PASS_MASKS,
             Self::MixedPixels => 0,
             Self::MixedColor => SHADED | key::OCCLUSION | key::LINES,
+            Self::MixedParts => key::LINES,
+            Self::MixedShade => SHADED | key::OCCLUSION,
+            Self::MixedSum => 0,
             Self::VisibilityFew { .. } => key::SAMPLES | key::PASS_MASKS | key::GANG,
             Self::Paint => SHADED | key::GANG,
             Self::VisibilityTile { target: SampleTarget::Layer, .. } => key::SAMPLES | key::BEHIND_SURFACE,

@@ -52,6 +52,12 @@ pub enum Kernel {
     MixedPixels,
     /// Points of mixed pixels to colours.
     MixedColor,
+    /// Lists of mixed pixels to the parts of their colours.
+    MixedParts,
+    /// Those parts to colours.
+    MixedShade,
+    /// Parts of mixed pixels to their sums.
+    MixedSum,
     /// Samples to bytes, where nothing else is to be drawn.
     Paint,
     /// Faces to the area that their lines leave free.
@@ -86,6 +92,8 @@ pub enum SampleTarget {
     Layer,
     /// The points of mixed pixels.
     Points,
+    /// The lists of mixed pixels.
+    Lists,
 }
 
 /// Buffers by their binding number in group 1 of every shader.
@@ -122,10 +130,11 @@ pub enum Slot {
     PeelRounds,
     SampleMasks,
     Occlusion,
+    Lists,
 }
 
 /// Number of [`Slot`]s.
-pub const SLOTS: usize = 31;
+pub const SLOTS: usize = 32;
 
 /// A kernel's access to a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -224,9 +233,10 @@ impl Kernel {
     pub fn stage(self) -> DrawStage {
         match self {
             Self::Transform => DrawStage::Transform,
-            Self::Visibility { target: SampleTarget::Points, .. }
-            | Self::VisibilityTile { target: SampleTarget::Points, .. } => DrawStage::Mixed,
+            Self::Visibility { target: SampleTarget::Points | SampleTarget::Lists, .. }
+            | Self::VisibilityTile { target: SampleTarget::Points | SampleTarget::Lists, .. } => DrawStage::Mixed,
             Self::Breaks | Self::Thin | Self::MixedPixels | Self::MixedColor => DrawStage::Mixed,
+            Self::MixedParts | Self::MixedShade | Self::MixedSum => DrawStage::Mixed,
             Self::Visibility { .. } | Self::Clip | Self::VisibilityTile { .. } | Self::VisibilityFew { .. } => {
                 DrawStage::Visibility
             }

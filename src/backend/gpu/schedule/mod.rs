@@ -46,6 +46,10 @@ const ROUNDS_QUEUED: u32 = 8;
 /// run 1,600 iterations for a pixel of 256 triangles, and thousands more to shade its share of them.
 const PIXELS_EACH: u32 = 16;
 
+/// The same of pixels that have lists on software: a thread runs 4,096 iterations for the longest list, and as many again for
+/// its points.
+const LISTS_EACH_SOFTWARE: u32 = 4;
+
 /// Samples that a thread of the transform stage empties, at most.
 const CLEARED_BY_THREAD: u32 = 4;
 
@@ -138,6 +142,8 @@ impl Schedule {
                 seen_margin: beyond,
                 rgba_at: if device.maps_pictures { first * plan.width_px } else { 0 },
                 samples_at: plan.samples * (banding.seen_columns(plan) * row_first.abs_diff(seen[0]) + banding.beyond),
+                list_capacity: banding.list_capacity(plan),
+                part_capacity: banding.part_capacity(plan),
                 ..Batch::default()
             }
         };
@@ -249,8 +255,10 @@ impl Schedule {
         target: SampleTarget,
         passes: [Option<Pass>; 2],
     ) -> Result<(), DrawError> {
+        // Lists take depth and id together.
+        let at_once = device.int64_atomics || target == SampleTarget::Lists;
         let writes: &[SampleWrite] =
-            if device.int64_atomics { &[SampleWrite::Both] } else { &[SampleWrite::Depth, SampleWrite::Id] };
+            if at_once { &[SampleWrite::Both] } else { &[SampleWrite::Depth, SampleWrite::Id] };
         // The depth phase must be complete before the id phase compares with it.
         for &write in writes {
             for Pass { ids, clip, faces, pass_bit } in passes.iter().flatten().cloned() {
@@ -318,14 +326,10 @@ impl Schedule {
         self.dispatch(device, Kernel::Resolve, count, pixels)
     }
 
-    /// The mixed pixels of a band: as many at a time as have room.
+    /// The mixed pixels of a band.
     fn mixed(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, pixels: Batch) -> Result<(), DrawError> {
         let around = (plan.width_px + 2) * (pixels.row_first.abs_diff(pixels.row_end) + 2);
         self.steps.push(Step::ClearMixed);
-        // Kernels leave all points clear, unless a software device ends their loops.
-        if device.loops_are_limited {
-            self.steps.push(Step::ClearPoints);
-        }
         self.dispatch(device, Kernel::Breaks, around, Batch { count: around, ..pixels })?;
         for Pass { ids, faces, pass_bit, .. } in Pass::of_visibility(plan).into_iter().flatten() {
             for first in ids.clone().step_by(CHUNK as usize) {
@@ -338,6 +342,23 @@ impl Schedule {
             }
         }
         self.dispatch(device, Kernel::MixedPixels, pixels.count, pixels)?;
+        if !device.lists_mixed {
+            return self.mixed_points(plan, device, pixels);
+        }
+        self.triangles(device, pixels, SampleTarget::Lists, Pass::of_visibility(plan))?;
+        let each = if device.loops_are_limited { LISTS_EACH_SOFTWARE } else { PIXELS_EACH };
+        self.dispatch_groups(device, Kernel::MixedParts, pixels.count.div_ceil(each), pixels)?;
+        let parts = self.banding.part_capacity(plan);
+        self.dispatch(device, Kernel::MixedShade, parts, pixels)?;
+        self.dispatch(device, Kernel::MixedSum, pixels.count, pixels)
+    }
+
+    /// The mixed pixels of a band by what each of their points sees: as many at a time as have room.
+    fn mixed_points(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, pixels: Batch) -> Result<(), DrawError> {
+        // Kernels leave all points clear, unless a software device ends their loops.
+        if device.loops_are_limited {
+            self.steps.push(Step::ClearPoints);
+        }
         let slots = self.banding.slots(plan);
         let (queued, pixels_each) = if device.loops_are_limited { (1, 1) } else { (ROUNDS_QUEUED, PIXELS_EACH) };
         let mut ends = Vec::new();

@@ -40,6 +40,17 @@ pub const MIXED_HEAD_BYTES: u64 = 16;
 /// Mixed pixels whose points are in memory at a time, at most: 64 MiB.
 const SLOTS_MAX: u32 = 1 << 15;
 
+/// Items in the lists of mixed pixels, for each pixel of the band, and in all, at most. 512 x 512 pixels have a million.
+const ITEMS_PER_PIXEL: u32 = 4;
+const LIST_ITEMS_MAX: u32 = 1 << 20;
+
+/// Parts of the colours of mixed pixels, at most.
+const PARTS_MAX: u32 = 1 << 19;
+
+/// Bytes of such an item, and of a part.
+const LIST_ITEM_BYTES: u64 = WORK_ITEM_BYTES;
+const PART_BYTES: u64 = 32;
+
 /// Bytes of a pixel of the picture.
 const RGBA_BYTES: u64 = 4;
 
@@ -61,6 +72,9 @@ pub struct DeviceTraits {
     /// True if a thread's loops are cut off after a number of iterations: see
     /// [`Tiles`](super::tiles::Tiles).
     pub loops_are_limited: bool,
+    /// True if mixed pixels have lists of triangles, for which there may be no room; otherwise what each of their points
+    /// sees is kept.
+    pub lists_mixed: bool,
 }
 
 /// The size of the largest triangle that a thread may draw by itself, 1/256 px: its edge values fit 32 bits.
@@ -76,6 +90,8 @@ pub struct Banding {
     /// Pixels beyond the picture, on each side, of which the visibility buffer holds those that are
     /// in a band's rows and margins.
     pub beyond: u32,
+    /// True if mixed pixels have lists.
+    pub lists_mixed: bool,
 }
 
 impl Banding {
@@ -98,7 +114,8 @@ impl Banding {
         let rows = rows_in(BAND_BYTES, u64::from(plan.width_px) * pixel_bytes(plan));
         let rows = rows.min(u64::from(plan.height_px)).max(1);
         let seen = rows_in(SEEN_BYTES, u64::from(plan.width_px + 2 * beyond) * seen_bytes(plan));
-        let whole = Self { rows: plan.height_px, margin: margin.min(beyond), beyond };
+        let lists_mixed = device.lists_mixed;
+        let whole = Self { rows: plan.height_px, margin: margin.min(beyond), beyond, lists_mixed };
         if rows >= u64::from(plan.height_px) && u64::from(whole.seen_rows(plan)) <= seen {
             return Ok(whole);
         }
@@ -107,7 +124,7 @@ impl Banding {
             let why = "the device has no room for what lines so wide look at in a picture so wide";
             return Err(DrawError::BeyondGpu(why.to_owned()));
         }
-        Ok(Self { rows: rows.min(room) as u32, margin, beyond })
+        Ok(Self { rows: rows.min(room) as u32, margin, beyond, lists_mixed })
     }
 
     /// Columns of the visibility buffer.
@@ -131,7 +148,7 @@ impl Banding {
         let layers = if plan.peeling().is_some() { PEEL_STATE_BYTES + SAMPLE_BYTES } else { 0 };
         let (strokes, owners) = if plan.lines.is_empty() { (0, 0) } else { (STROKES_BYTES, OWNER_BYTES) };
         let pixel = u64::from(plan.samples) * layers + color_bytes(plan) + strokes + owners + RGBA_BYTES;
-        let seen = seen + self.mixed_bytes(plan) + self.points_bytes(plan);
+        let seen = seen + self.mixed_bytes(plan) + self.points_bytes(plan) + self.lists_bytes(plan);
         seen + u64::from(plan.width_px) * u64::from(self.rows) * pixel
     }
 }
@@ -146,14 +163,30 @@ impl Banding {
     pub fn mixed_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
         let [width, rows] = [plan.width_px, self.rows].map(u64::from);
         let border = if plan.lines.is_empty() { 0 } else { POINTS as u64 / 32 };
-        let words = (2 + border) * width * rows + (width + 2) * (rows + 2);
+        let words = (4 + border) * width * rows + (width + 2) * (rows + 2) + u64::from(self.list_capacity(plan));
         if plan.has_mixed() { MIXED_HEAD_BYTES + 4 * words } else { 0 }
     }
 
     /// Bytes of what the points of some of them see.
     pub fn points_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
         let slot = POINTS as u64 * SAMPLE_BYTES;
-        if plan.has_mixed() { u64::from(self.slots(plan)) * slot } else { 0 }
+        if plan.has_mixed() && !self.lists_mixed { u64::from(self.slots(plan)) * slot } else { 0 }
+    }
+
+    /// Items in the lists of mixed pixels that there is room for.
+    pub fn list_capacity(&self, plan: &DrawPlan<'_>) -> u32 {
+        let wanted = (plan.width_px * self.rows).saturating_mul(ITEMS_PER_PIXEL).min(LIST_ITEMS_MAX);
+        if plan.has_mixed() && self.lists_mixed { wanted } else { 0 }
+    }
+
+    /// Parts of their colours that there is room for.
+    pub fn part_capacity(&self, plan: &DrawPlan<'_>) -> u32 {
+        self.list_capacity(plan).min(PARTS_MAX)
+    }
+
+    /// Bytes of the lists and parts.
+    pub fn lists_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
+        LIST_ITEM_BYTES * u64::from(self.list_capacity(plan)) + PART_BYTES * u64::from(self.part_capacity(plan))
     }
 }
 
@@ -167,6 +200,7 @@ pub fn bands_bytes(plan: &DrawPlan<'_>) -> u64 {
         maps_pictures: false,
         int64_atomics: true,
         loops_are_limited: false,
+        lists_mixed: true,
     };
     // Buffers are made a quarter larger than they need to be.
     Banding::new(plan, &device, Goal::Picture)

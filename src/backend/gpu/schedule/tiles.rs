@@ -152,7 +152,7 @@ mod tests {
             let triangles = vec![[0; 3]; triangles];
             let mut plan = plan(&triangles, case);
             plan.hull = None;
-            let banding = Banding { rows: 256, margin: 0, beyond: 0 };
+            let banding = Banding { rows: 256, margin: 0, beyond: 0, lists_mixed: false };
             let tiles = Tiles::new(&plan, &software, banding, u64::from(plan.samples));
             let all = PIECES_MAX * triangles.len() as u32;
             let rounds = tiles.rounds(all, all);

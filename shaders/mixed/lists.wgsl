@@ -1,0 +1,42 @@
+// Stage mixed, per triangle and mixed pixel: lists of the triangles that each pixel may show. Twin of
+// src/backend/cpu/mixed/lists.rs. Items of a list are in no order; nothing depends on it.
+
+@group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
+@group(1) @binding(31) var<storage, read_write> lists: array<vec4<u32>>;
+
+// True if there are mixed pixels, and room for their triangles so far.
+fn is_any_wanted() -> bool {
+    return atomicLoad(&mixed[0]) != 0u && atomicLoad(&mixed[OVERFLOW]) == 0u;
+}
+
+fn draw_small(s: Setup, bounds: vec4<i32>, id: u32) {
+    let e = edges_of(s);
+    for (var y = bounds.y; y <= bounds.w; y++) {
+        for (var x = bounds.x; x <= bounds.z; x++) {
+            append(s, e, vec2(x, y), id);
+        }
+    }
+}
+
+fn draw_pixel(s: Setup, e: Edges, values: vec3<i32>, in_block: vec2<i32>, pixel: vec2<i32>, id: u32) {
+    append(s, e, pixel, id);
+}
+
+// Puts a triangle in front of a pixel's list if the pixel is mixed and the triangle may touch it.
+fn append(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
+    let number = atomicLoad(&mixed[number_at(u32((pixel.y - batch.row_first) * frame.width + pixel.x))]);
+    if number == 0u || is_beside(e, point_edges(s, e, pixel_corner(pixel))) {
+        return;
+    }
+    let item = atomicAdd(&mixed[ITEM_COUNT], 1u);
+    if item >= batch.list_capacity {
+        atomicStore(&mixed[OVERFLOW], 1u);
+        return;
+    }
+    let first = ITEM_VECTORS * item;
+    lists[first] = vec4(bitcast<vec3<u32>>(s.x), id);
+    lists[first + 1u] = vec4(bitcast<vec3<u32>>(s.y), bitcast<u32>(s.depth_range.x));
+    lists[first + 2u] = vec4(bitcast<vec3<u32>>(s.depth), bitcast<u32>(s.depth_range.y));
+    let next = atomicExchange(&mixed[list_at((number & ~FEW) - 1u)], item);
+    atomicStore(&mixed[next_at(item)], next);
+}

@@ -1,0 +1,128 @@
+// Stage mixed, per mixed pixel: which triangle of its list each point sees, and so the parts that its colour is the sum of.
+// Twin of src/backend/cpu/mixed/color.rs and faces.rs. mixed_shade.wgsl finds the parts' colours, mixed_sum.wgsl adds them.
+
+@group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
+// Items of lists, then parts.
+@group(1) @binding(31) var<storage, read_write> lists: array<vec4<u32>>;
+
+// Longest list. A pixel that has a longer one is left out, and so is the picture.
+const LIST_MAX: u32 = 4096u;
+
+var<workgroup> pixel_count: u32;
+// The pixel's first part.
+var<workgroup> part_first: u32;
+
+@compute @workgroup_size(WORKGROUP)
+fn mixed_parts(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    if thread == 0u {
+        pixel_count = atomicLoad(&mixed[0]);
+    }
+    let count = workgroupUniformLoad(&pixel_count);
+    for (var number = workgroup.x + workgroup.y * groups.x; number < count; number += groups.x * groups.y) {
+        write_parts(number, thread);
+        // Another pixel must not be read before all threads are done with this one.
+        workgroupBarrier();
+    }
+}
+
+// Writes the parts of the pixel of this number.
+fn write_parts(number: u32, thread: u32) {
+    let entry = atomicLoad(&mixed[pixel_at(number)]);
+    let at = entry & ~FEW;
+    let is_few = (entry & FEW) != 0u;
+    see(number, vec2(i32(at) % frame.width, batch.row_first + i32(at) / frame.width), own_points(thread, is_few));
+    find_firsts(thread, is_few);
+    if thread == 0u {
+        var count = 0u;
+        for (var w = 0u; w < FIRSTS_WORDS; w++) {
+            count += countOneBits(atomicLoad(&firsts[w]));
+        }
+        part_first = take_parts(number, count);
+    }
+    let first = workgroupUniformLoad(&part_first);
+    let own = own_points(thread, is_few);
+    for (var p = own.x; first != LIST_END && p < POINTS; p += own.y) {
+        if is_first(p) {
+            let share = share_of(p, is_few);
+            let part = part_at(first + firsts_before(p));
+            lists[part] = vec4(~seen[p].x, at, bitcast<u32>(share.weight), seen[p].y);
+            lists[part + 1u] = vec4(bitcast<vec2<u32>>(share.mean), 0u, 0u);
+        }
+    }
+    if has(LINES) && thread < BORDER_WORDS {
+        atomicStore(&mixed[border_at(number) + thread], select(border_word(thread), 0u, is_few));
+    }
+}
+
+// Takes room for so many parts of a pixel, and returns the first; LIST_END if there is none.
+fn take_parts(number: u32, count: u32) -> u32 {
+    let first = atomicAdd(&mixed[PART_COUNT], count);
+    if first + count > batch.part_capacity {
+        atomicStore(&mixed[OVERFLOW], 1u);
+        atomicStore(&mixed[parts_at(number)], 0u);
+        return LIST_END;
+    }
+    atomicStore(&mixed[parts_at(number)], first * PARTS_OF_PIXEL + count);
+    return first;
+}
+
+// How many points before p are the first ones of a triangle.
+fn firsts_before(p: u32) -> u32 {
+    var count = countOneBits(atomicLoad(&firsts[p / 32u]) & ((1u << (p % 32u)) - 1u));
+    for (var w = 0u; w < p / 32u; w++) {
+        count += countOneBits(atomicLoad(&firsts[w]));
+    }
+    return count;
+}
+
+// Finds what the points of a thread see: one of few, or four.
+fn see(number: u32, pixel: vec2<i32>, own: vec2<u32>) {
+    let corner = pixel_corner(pixel);
+    var a = vec2(0u);
+    var b = a;
+    var c = a;
+    var d = a;
+    let is_few = own.y != WORKGROUP;
+    var item = atomicLoad(&mixed[list_at(number)]);
+    for (var length = 0u; item != LIST_END; length++) {
+        if length == LIST_MAX {
+            atomicStore(&mixed[OVERFLOW], 1u);
+            break;
+        }
+        let x = lists[ITEM_VECTORS * item];
+        let y = lists[ITEM_VECTORS * item + 1u];
+        let depth = lists[ITEM_VECTORS * item + 2u];
+        let s = Setup(
+            bitcast<vec3<i32>>(x.xyz),
+            bitcast<vec3<i32>>(y.xyz),
+            bitcast<vec3<f32>>(depth.xyz),
+            vec2(bitcast<f32>(y.w), bitcast<f32>(depth.w)),
+        );
+        let e = edges_of(s);
+        let values = point_edges(s, e, corner);
+        let start = vec2(corner.x - s.x.x, corner.y - s.y.x);
+        a = nearer(a, vec2(~x.w, bitcast<u32>(depth_at_point(s, e, values, start, own.x))));
+        if !is_few {
+            b = nearer(b, vec2(~x.w, bitcast<u32>(depth_at_point(s, e, values, start, own.x + WORKGROUP))));
+            c = nearer(c, vec2(~x.w, bitcast<u32>(depth_at_point(s, e, values, start, own.x + 2u * WORKGROUP))));
+            d = nearer(d, vec2(~x.w, bitcast<u32>(depth_at_point(s, e, values, start, own.x + 3u * WORKGROUP))));
+        }
+        item = atomicLoad(&mixed[next_at(item)]);
+    }
+    seen[own.x] = a;
+    if !is_few {
+        seen[own.x + WORKGROUP] = b;
+        seen[own.x + 2u * WORKGROUP] = c;
+        seen[own.x + 3u * WORKGROUP] = d;
+    }
+}
+
+// The nearer of two words that points see; the one with the lower id where they are at one depth.
+fn nearer(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
+    let is_b = b.y != 0u && (b.y > a.y || (b.y == a.y && b.x > a.x));
+    return select(a, b, is_b);
+}

@@ -1,0 +1,17 @@
+// Stage mixed, per part of a mixed pixel: what a triangle adds to the pixel's colour. Twin of
+// src/backend/cpu/surface/waiting.rs.
+
+@group(1) @binding(22) var<storage, read> mixed: array<u32>;
+// The parts become colours.
+@group(1) @binding(31) var<storage, read_write> lists: array<vec4<u32>>;
+
+@compute @workgroup_size(WORKGROUP)
+fn mixed_shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let count = min(mixed[PART_COUNT], batch.part_capacity);
+    let threads = groups.x * groups.y * WORKGROUP;
+    for (var i = gid.x + gid.y * groups.x * WORKGROUP; i < count; i += threads) {
+        let part = lists[part_at(i)];
+        let share = Share(bitcast<f32>(part.z), bitcast<vec2<f32>>(lists[part_at(i) + 1u].xy));
+        lists[part_at(i)] = bitcast<vec4<u32>>(share_color(part.x, part.y, share, bitcast<f32>(part.w)));
+    }
+}

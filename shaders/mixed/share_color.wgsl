@@ -1,0 +1,25 @@
+// Stage mixed, per triangle in a mixed pixel: its colour.
+
+// Low word: complement of the id. High word: depth.
+@group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
+
+// The pixel with this index in the band.
+fn pixel_of(at: u32) -> vec2<i32> {
+    return vec2(i32(at) % frame.width, batch.row_first + i32(at) / frame.width);
+}
+
+// The colour of a triangle at a point of a pixel, times the triangle's weight, given its depth there.
+fn share_color(id: u32, at: u32, share: Share, depth: f32) -> vec4<f32> {
+    if id >= frame.triangle_count {
+        return rn4(share.weight * hull_color(id));
+    }
+    if !has(SURFACE) {
+        return vec4(0.0);
+    }
+    let pixel = pixel_of(at);
+    var show = Show(true, 1.0, 1.0);
+    if has(OCCLUSION) {
+        show.open = open_share(pixel, depth, bitcast<f32>(samples[first_visibility_sample(at)].y));
+    }
+    return rn4(share.weight * point_color(id, vec2<f32>(pixel_corner(pixel)) + share.mean, show));
+}
