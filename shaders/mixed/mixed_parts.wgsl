@@ -9,6 +9,7 @@
 const LIST_MAX: u32 = 4096u;
 
 var<workgroup> pixel_count: u32;
+var<workgroup> list_length: u32;
 // The pixel's first part.
 var<workgroup> part_first: u32;
 
@@ -21,6 +22,7 @@ fn mixed_parts(
     if thread == 0u {
         pixel_count = atomicLoad(&mixed[0]);
     }
+    find_digit_sets(thread);
     let count = workgroupUniformLoad(&pixel_count);
     for (var number = workgroup.x + workgroup.y * groups.x; number < count; number += groups.x * groups.y) {
         write_parts(number, thread);
@@ -34,28 +36,47 @@ fn write_parts(number: u32, thread: u32) {
     let entry = atomicLoad(&mixed[pixel_at(number)]);
     let at = entry & ~FEW;
     let is_few = (entry & FEW) != 0u;
-    see(number, vec2(i32(at) % frame.width, batch.row_first + i32(at) / frame.width), own_points(thread, is_few));
-    find_firsts(thread, is_few);
+    let own = own_points(thread, is_few);
+    clear_sets(thread);
+    let found = see(number, vec2(i32(at) % frame.width, batch.row_first + i32(at) / frame.width), own);
     if thread == 0u {
-        var count = 0u;
-        for (var w = 0u; w < FIRSTS_WORDS; w++) {
-            count += countOneBits(atomicLoad(&firsts[w]));
-        }
-        part_first = take_parts(number, count);
+        list_length = found.length;
+    }
+    let length = workgroupUniformLoad(&list_length);
+    let has_sets = length <= WORKGROUP;
+    if has_sets {
+        add_points(found.items, own);
+        workgroupBarrier();
+        find_firsts_of_sets(thread, length);
+        workgroupBarrier();
+    } else {
+        find_firsts(thread, is_few);
+    }
+    if thread == 0u {
+        part_first = take_parts(number, first_count());
     }
     let first = workgroupUniformLoad(&part_first);
-    let own = own_points(thread, is_few);
-    for (var p = own.x; first != LIST_END && p < POINTS; p += own.y) {
+    if first != LIST_END && has_sets && thread < length {
+        let p = first_of_set(thread);
+        if p < POINTS {
+            write_part(first, p, at, share_of_set(thread, is_few));
+        }
+    }
+    for (var p = own.x; first != LIST_END && !has_sets && p < POINTS; p += own.y) {
         if is_first(p) {
-            let share = share_of(p, is_few);
-            let part = part_at(first + firsts_before(p));
-            lists[part] = vec4(~seen[p].x, at, bitcast<u32>(share.weight), seen[p].y);
-            lists[part + 1u] = vec4(bitcast<vec2<u32>>(share.mean), 0u, 0u);
+            write_part(first, p, at, share_of(p, is_few));
         }
     }
     if has(LINES) && thread < BORDER_WORDS {
         atomicStore(&mixed[border_at(number) + thread], select(border_word(thread), 0u, is_few));
     }
+}
+
+// Writes the part of the triangle that p is the first point of, given the pixel's first part.
+fn write_part(first: u32, p: u32, at: u32, share: Share) {
+    let part = part_at(first + firsts_before(p));
+    lists[part] = vec4(~seen[p].x, at, bitcast<u32>(share.weight), seen[p].y);
+    lists[part + 1u] = vec4(bitcast<vec2<u32>>(share.mean), 0u, 0u);
 }
 
 // Takes room for so many parts of a pixel, and returns the first; LIST_END if there is none.
@@ -70,25 +91,23 @@ fn take_parts(number: u32, count: u32) -> u32 {
     return first;
 }
 
-// How many points before p are the first ones of a triangle.
-fn firsts_before(p: u32) -> u32 {
-    var count = countOneBits(atomicLoad(&firsts[p / 32u]) & ((1u << (p % 32u)) - 1u));
-    for (var w = 0u; w < p / 32u; w++) {
-        count += countOneBits(atomicLoad(&firsts[w]));
-    }
-    return count;
-}
+// The length of a pixel's list, and the item of it that each point of a thread sees.
+struct Found {
+    length: u32,
+    items: vec4<u32>,
+};
 
 // Finds what the points of a thread see: one of few, or four.
-fn see(number: u32, pixel: vec2<i32>, own: vec2<u32>) {
+fn see(number: u32, pixel: vec2<i32>, own: vec2<u32>) -> Found {
     let corner = pixel_corner(pixel);
-    var a = vec2(0u);
+    var a = vec3(0u);
     var b = a;
     var c = a;
     var d = a;
     let is_few = own.y != WORKGROUP;
     var item = atomicLoad(&mixed[list_at(number)]);
-    for (var length = 0u; item != LIST_END; length++) {
+    var length = 0u;
+    while item != LIST_END {
         if length == LIST_MAX {
             atomicStore(&mixed[OVERFLOW], 1u);
             break;
@@ -105,24 +124,28 @@ fn see(number: u32, pixel: vec2<i32>, own: vec2<u32>) {
         let e = edges_of(s);
         let values = point_edges(s, e, corner);
         let start = vec2(corner.x - s.x.x, corner.y - s.y.x);
-        a = nearer(a, vec2(~x.w, bitcast<u32>(depth_at_point(s, e, values, start, own.x))));
+        a = nearer(a, ~x.w, depth_at_point(s, e, values, start, own.x), length);
         if !is_few {
-            b = nearer(b, vec2(~x.w, bitcast<u32>(depth_at_point(s, e, values, start, own.x + WORKGROUP))));
-            c = nearer(c, vec2(~x.w, bitcast<u32>(depth_at_point(s, e, values, start, own.x + 2u * WORKGROUP))));
-            d = nearer(d, vec2(~x.w, bitcast<u32>(depth_at_point(s, e, values, start, own.x + 3u * WORKGROUP))));
+            b = nearer(b, ~x.w, depth_at_point(s, e, values, start, own.x + WORKGROUP), length);
+            c = nearer(c, ~x.w, depth_at_point(s, e, values, start, own.x + 2u * WORKGROUP), length);
+            d = nearer(d, ~x.w, depth_at_point(s, e, values, start, own.x + 3u * WORKGROUP), length);
         }
         item = atomicLoad(&mixed[next_at(item)]);
+        length++;
     }
-    seen[own.x] = a;
+    seen[own.x] = a.xy;
     if !is_few {
-        seen[own.x + WORKGROUP] = b;
-        seen[own.x + 2u * WORKGROUP] = c;
-        seen[own.x + 3u * WORKGROUP] = d;
+        seen[own.x + WORKGROUP] = b.xy;
+        seen[own.x + 2u * WORKGROUP] = c.xy;
+        seen[own.x + 3u * WORKGROUP] = d.xy;
     }
+    return Found(length, vec4(a.z, b.z, c.z, d.z));
 }
 
-// The nearer of two words that points see; the one with the lower id where they are at one depth.
-fn nearer(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
-    let is_b = b.y != 0u && (b.y > a.y || (b.y == a.y && b.x > a.x));
-    return select(a, b, is_b);
+// The nearer of what a point sees so far (the complement of an id, a depth, an item) and a triangle; the one with the
+// lower id where they are at one depth.
+fn nearer(best: vec3<u32>, word: u32, z: f32, item: u32) -> vec3<u32> {
+    let depth = bitcast<u32>(z);
+    let is_nearer = depth != 0u && (depth > best.y || (depth == best.y && word > best.x));
+    return select(best, vec3(word, depth, item), is_nearer);
 }

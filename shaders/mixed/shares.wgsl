@@ -43,6 +43,23 @@ fn is_first(p: u32) -> bool {
     return (atomicLoad(&firsts[p / 32u]) >> (p % 32u) & 1u) != 0u;
 }
 
+// How many triangles have a first point.
+fn first_count() -> u32 {
+    return firsts_before(POINTS);
+}
+
+// How many points before p are the first ones of a triangle.
+fn firsts_before(p: u32) -> u32 {
+    var count = 0u;
+    for (var w = 0u; w < p / 32u; w++) {
+        count += countOneBits(atomicLoad(&firsts[w]));
+    }
+    if p < POINTS {
+        count += countOneBits(atomicLoad(&firsts[p / 32u]) & ((1u << (p % 32u)) - 1u));
+    }
+    return count;
+}
+
 // The share of the triangle that p is the first point of.
 fn share_of(p: u32, is_few: bool) -> Share {
     let step = select(1u, FEW_STEP, is_few);

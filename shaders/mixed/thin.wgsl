@@ -27,7 +27,9 @@ fn thin(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    let i = (workgroup.x + workgroup.y * groups.x) * WORKGROUP + thread;
+    // Several workgroups share the steps of the same triangles where there are few triangles.
+    let group = workgroup.x + workgroup.y * groups.x;
+    let i = group / batch.groups_each * WORKGROUP + thread;
     if thread == 0u {
         atomicStore(&thin_count, 0u);
     }
@@ -45,7 +47,7 @@ fn thin(
     }
     let count = workgroupUniformLoad(&step_count);
     var n = 0u;
-    for (var step = thread; step < count; step += WORKGROUP) {
+    for (var step = group % batch.groups_each * WORKGROUP + thread; step < count; step += batch.groups_each * WORKGROUP) {
         // Steps of a thread go up, and so do the triangles that they are of.
         while step >= ends[n] {
             n++;
@@ -168,8 +170,11 @@ fn mark(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
     if !any(are_behind) || any(ids == vec4(id)) || is_beside(e, point_edges(s, e, pixel_corner(pixel))) {
         return;
     }
-    var found = breaks_to(id, ids.x, are_behind.x) | breaks_to(id, ids.y, are_behind.y);
-    found |= breaks_to(id, ids.z, are_behind.z) | breaks_to(id, ids.w, are_behind.w);
+    // Most samples see what one before them sees.
+    var found = breaks_to(id, ids.x, are_behind.x);
+    found |= breaks_to(id, ids.y, are_behind.y && !(are_behind.x && ids.y == ids.x));
+    found |= breaks_to(id, ids.z, are_behind.z && !any(are_behind.xy & (ids.xy == ids.zz)));
+    found |= breaks_to(id, ids.w, are_behind.w && !any(are_behind.xyz & (ids.xyz == ids.www)));
     if found != 0u {
         atomicOr(&mixed[breaks_at(pixel)], found);
     }

@@ -118,6 +118,8 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
         "HEAD_WORDS" = MIXED_HEAD_BYTES / 4,
         "BORDER_WORDS" = POINTS / 32,
         "FIRSTS_WORDS" = POINTS / 32,
+        "SETS_WORDS" = WORKGROUP as usize * POINTS / 32,
+        "DIGIT_WORDS" = 8 * POINTS / 32,
         "PLACE_MAX" = points::PLACE_MAX,
         "FEW_STEP" = points::Lattice::<1>::STEP
     );

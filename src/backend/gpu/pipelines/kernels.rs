@@ -41,6 +41,7 @@ const MIXED_LATTICE: &str = include_str!("../../../../shaders/mixed/lattice.wgsl
 const MIXED_POINTS: &str = include_str!("../../../../shaders/mixed/points.wgsl");
 const MIXED_LISTS: &str = include_str!("../../../../shaders/mixed/lists.wgsl");
 const SHARES: &str = include_str!("../../../../shaders/mixed/shares.wgsl");
+const POINT_SETS: &str = include_str!("../../../../shaders/mixed/point_sets.wgsl");
 const SHARE_COLOR: &str = include_str!("../../../../shaders/mixed/share_color.wgsl");
 const HULL: &str = include_str!("../../../../shaders/surface/hull.wgsl");
 const GROUP: &str = include_str!("../../../../shaders/surface/group.wgsl");
@@ -205,7 +206,7 @@ impl Kernel {
             }
             Self::MixedParts => {
                 let kernel = include_str!("../../../../shaders/mixed/mixed_parts.wgsl");
-                return [TRIANGLE, MIXED_PLACE, POINT_EDGES, MIXED_LATTICE, SHARES, kernel].concat();
+                return [TRIANGLE, MIXED_PLACE, POINT_EDGES, MIXED_LATTICE, SHARES, POINT_SETS, kernel].concat();
             }
             Self::MixedSum => return [MIXED_PLACE, include_str!("../../../../shaders/mixed/mixed_sum.wgsl")].concat(),
             // Numbers of pixels alone.

@@ -46,7 +46,13 @@ const ROUNDS_QUEUED: u32 = 8;
 /// run 1,600 iterations for a pixel of 256 triangles, and thousands more to shade its share of them.
 const PIXELS_EACH: u32 = 16;
 
-/// The same of pixels that have lists on software: a thread runs 4,096 iterations for the longest list, and as many again for
+/// Workgroups of a real device that look for thin triangles, at least: a few triangles may be thin and long.
+const THIN_WORKGROUPS: u32 = 2048;
+
+/// Workgroups of a real device that find the parts of mixed pixels, at most.
+const PARTS_WORKGROUPS: u32 = 4096;
+
+/// Pixels that have lists, for a workgroup on software: a thread runs 4,096 iterations for the longest list, and as many again for
 /// its points.
 const LISTS_EACH_SOFTWARE: u32 = 4;
 
@@ -334,8 +340,10 @@ impl Schedule {
         for Pass { ids, faces, pass_bit, .. } in Pass::of_visibility(plan).into_iter().flatten() {
             for first in ids.clone().step_by(CHUNK as usize) {
                 let (count, pass_bit) = (CHUNK.min(ids.end - first), u32::from(pass_bit));
-                let batch = Batch { first, count, faces: faces_code(faces), pass_bit, ..pixels };
-                self.dispatch(device, Kernel::Thin, count, batch)?;
+                let groups = count.div_ceil(WORKGROUP);
+                let groups_each = if device.loops_are_limited { 1 } else { THIN_WORKGROUPS.div_ceil(groups) };
+                let batch = Batch { first, count, faces: faces_code(faces), pass_bit, groups_each, ..pixels };
+                self.dispatch_groups(device, Kernel::Thin, groups * groups_each, batch)?;
                 if ids.len() > CHUNK as usize {
                     self.steps.push(Step::Submit);
                 }
@@ -347,7 +355,8 @@ impl Schedule {
         }
         self.triangles(device, pixels, SampleTarget::Lists, Pass::of_visibility(plan))?;
         let each = if device.loops_are_limited { LISTS_EACH_SOFTWARE } else { PIXELS_EACH };
-        self.dispatch_groups(device, Kernel::MixedParts, pixels.count.div_ceil(each), pixels)?;
+        let most = if device.loops_are_limited { u32::MAX } else { PARTS_WORKGROUPS };
+        self.dispatch_groups(device, Kernel::MixedParts, pixels.count.div_ceil(each).min(most), pixels)?;
         let parts = self.banding.part_capacity(plan);
         self.dispatch(device, Kernel::MixedShade, parts, pixels)?;
         self.dispatch(device, Kernel::MixedSum, pixels.count, pixels)

@@ -40,8 +40,10 @@ pub const MIXED_HEAD_BYTES: u64 = 16;
 /// Mixed pixels whose points are in memory at a time, at most: 64 MiB.
 const SLOTS_MAX: u32 = 1 << 15;
 
-/// Items in the lists of mixed pixels, for each pixel of the band, and in all, at most. 512 x 512 pixels have a million.
+/// Items in the lists of mixed pixels: for each pixel of the band, and the least and the most in all. 512 x 512 pixels have
+/// a million.
 const ITEMS_PER_PIXEL: u32 = 4;
+const LIST_ITEMS_MIN: u32 = 1 << 18;
 const LIST_ITEMS_MAX: u32 = 1 << 20;
 
 /// Parts of the colours of mixed pixels, at most.
@@ -175,7 +177,7 @@ impl Banding {
 
     /// Items in the lists of mixed pixels that there is room for.
     pub fn list_capacity(&self, plan: &DrawPlan<'_>) -> u32 {
-        let wanted = (plan.width_px * self.rows).saturating_mul(ITEMS_PER_PIXEL).min(LIST_ITEMS_MAX);
+        let wanted = (plan.width_px * self.rows).saturating_mul(ITEMS_PER_PIXEL).clamp(LIST_ITEMS_MIN, LIST_ITEMS_MAX);
         if plan.has_mixed() && self.lists_mixed { wanted } else { 0 }
     }
 

@@ -183,16 +183,26 @@ fn large_pictures_are_drawn_in_rounds_and_bands() {
     Likeness::of(&found, &want).assert(Tolerance::TWINS, "2000 x 1200 px");
 }
 
-/// More triangles in a few pixels than lists have room for, and in a single one.
+/// More triangles in a few pixels than lists have room for, and in a single one; and so many in each that they are told apart
+/// in another way. A GPU's lists have room for 262,144 triangles of small pictures, 4,096 of a pixel, and 64 are told apart as
+/// sets.
 #[test]
 fn crowded_pixels_have_the_same_bytes() {
-    let mesh = scenes::mesh(&shapes::torus(520));
     let (mut plain, mut quick) = (CpuRenderer::plain(1), CpuRenderer::new(2));
-    for size in ["2", "9"] {
+    let mut gpus: Vec<GpuRenderer> = gpus().into_iter().flatten().map(|gpu| GpuRenderer::new(gpu.clone())).collect();
+    for (count, size) in [(520, "2"), (520, "9"), (120, "2"), (60, "9"), (24, "9")] {
+        let mesh = scenes::mesh(&shapes::torus(count));
         let keys = [("size", size), ("style", "flat"), ("samples", "adaptive"), ("camera.margin", "0")];
         let plan = scenes::plan(&mesh, &scenes::spec(&keys));
-        assert!(draw(&mut quick, &plan) == draw(&mut plain, &plan), "{size} px");
-        assert!(quick.draw_times().mixed_pixels >= 4, "{size} px");
+        let (want, name) = (draw(&mut plain, &plan), format!("torus of {count}, {size} px"));
+        let mixed = plain.draw_times().mixed_pixels;
+        assert!(draw(&mut quick, &plan) == want, "{name}");
+        assert!(mixed >= 4, "{name}");
+        for gpu in &mut gpus {
+            let found = draw(gpu, &plan);
+            assert_eq!(gpu.draw_times().mixed_pixels, mixed, "{name}");
+            Likeness::of(&found, &want).assert(Tolerance::TWINS, &name);
+        }
     }
 }
 
