@@ -18,15 +18,26 @@ fn point_place(i: u32) -> vec2<i32> {
     return vec2<i32>(vec2(i, (i * GENERATOR) % POINTS));
 }
 
-// Depth of a triangle at point i of a pixel whose edge functions are c; 0 where the triangle does not cover it. start: the
-// pixel's corner, seen from the triangle's first.
-fn depth_at_point(s: Setup, e: Edges, c: vec3<i32>, start: vec2<i32>, i: u32) -> f32 {
+// A triangle, seen from a pixel.
+struct PointTriangle {
+    // Values of its edge functions at the pixel's first point, halved, and their changes down and, negated, to the right.
+    values: vec3<i32>,
+    dx: vec3<i32>,
+    dy: vec3<i32>,
+    // The pixel's corner, seen from the triangle's first.
+    start: vec2<i32>,
+    depth: vec3<f32>,
+    depth_range: vec2<f32>,
+};
+
+// Its depth at point i; 0 where it does not cover the point.
+fn depth_at_point(t: PointTriangle, i: u32) -> f32 {
     let place = point_place(i);
-    let value = c + e.dx * place.y - e.dy * place.x;
+    let value = t.values + t.dx * place.y - t.dy * place.x;
     if (value.x | value.y | value.z) < 0 {
         return 0.0;
     }
-    let p = rn2(vec2<f32>(2 * (start + place) + 1) * 0.5);
-    let plane = rn(s.depth.x + rn(s.depth.y * p.x)) + rn(s.depth.z * p.y);
-    return max(min(max(plane, s.depth_range.x), s.depth_range.y), 0.0);
+    let p = rn2(vec2<f32>(2 * (t.start + place) + 1) * 0.5);
+    let plane = rn(t.depth.x + rn(t.depth.y * p.x)) + rn(t.depth.z * p.y);
+    return max(min(max(plane, t.depth_range.x), t.depth_range.y), 0.0);
 }

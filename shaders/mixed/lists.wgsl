@@ -25,7 +25,12 @@ fn draw_pixel(s: Setup, e: Edges, values: vec3<i32>, in_block: vec2<i32>, pixel:
 // Puts a triangle in front of a pixel's list if the pixel is mixed and the triangle may touch it.
 fn append(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
     let number = atomicLoad(&mixed[number_at(u32((pixel.y - batch.row_first) * frame.width + pixel.x))]);
-    if number == 0u || is_beside(e, point_edges(s, e, pixel_corner(pixel))) {
+    if number == 0u {
+        return;
+    }
+    let corner = pixel_corner(pixel);
+    let values = point_edges(s, e, corner);
+    if is_beside(e, values) {
         return;
     }
     let item = atomicAdd(&mixed[ITEM_COUNT], 1u);
@@ -33,10 +38,12 @@ fn append(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
         atomicStore(&mixed[OVERFLOW], 1u);
         return;
     }
-    let first = ITEM_VECTORS * item;
-    lists[first] = vec4(bitcast<vec3<u32>>(s.x), id);
-    lists[first + 1u] = vec4(bitcast<vec3<u32>>(s.y), bitcast<u32>(s.depth_range.x));
-    lists[first + 2u] = vec4(bitcast<vec3<u32>>(s.depth), bitcast<u32>(s.depth_range.y));
+    let start = vec2(corner.x - s.x.x, corner.y - s.y.x);
+    let first = item_at(item);
+    // The third changes of edge functions are what is missing to 0.
+    lists[first] = bitcast<vec4<u32>>(vec4(values, start.x));
+    lists[first + 1u] = bitcast<vec4<u32>>(vec4(e.dx.xy, e.dy.xy));
+    lists[first + 2u] = vec4(bitcast<vec3<u32>>(s.depth), bitcast<u32>(start.y));
     let next = atomicExchange(&mixed[list_at((number & ~FEW) - 1u)], item);
-    atomicStore(&mixed[next_at(item)], next);
+    lists[first + 3u] = vec4(bitcast<vec2<u32>>(s.depth_range), id, next);
 }

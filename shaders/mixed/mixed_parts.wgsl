@@ -38,7 +38,7 @@ fn write_parts(number: u32, thread: u32) {
     let is_few = (entry & FEW) != 0u;
     let own = own_points(thread, is_few);
     clear_sets(thread);
-    let found = see(number, vec2(i32(at) % frame.width, batch.row_first + i32(at) / frame.width), own);
+    let found = see(number, own);
     if thread == 0u {
         list_length = found.length;
     }
@@ -98,8 +98,7 @@ struct Found {
 };
 
 // Finds what the points of a thread see: one of few, or four.
-fn see(number: u32, pixel: vec2<i32>, own: vec2<u32>) -> Found {
-    let corner = pixel_corner(pixel);
+fn see(number: u32, own: vec2<u32>) -> Found {
     var a = vec3(0u);
     var b = a;
     var c = a;
@@ -112,25 +111,25 @@ fn see(number: u32, pixel: vec2<i32>, own: vec2<u32>) -> Found {
             atomicStore(&mixed[OVERFLOW], 1u);
             break;
         }
-        let x = lists[ITEM_VECTORS * item];
-        let y = lists[ITEM_VECTORS * item + 1u];
-        let depth = lists[ITEM_VECTORS * item + 2u];
-        let s = Setup(
-            bitcast<vec3<i32>>(x.xyz),
-            bitcast<vec3<i32>>(y.xyz),
+        let values = bitcast<vec4<i32>>(lists[item_at(item)]);
+        let steps = bitcast<vec4<i32>>(lists[item_at(item) + 1u]);
+        let depth = lists[item_at(item) + 2u];
+        let rest = lists[item_at(item) + 3u];
+        let triangle = PointTriangle(
+            values.xyz,
+            vec3(steps.xy, -steps.x - steps.y),
+            vec3(steps.zw, -steps.z - steps.w),
+            vec2(values.w, bitcast<i32>(depth.w)),
             bitcast<vec3<f32>>(depth.xyz),
-            vec2(bitcast<f32>(y.w), bitcast<f32>(depth.w)),
+            bitcast<vec2<f32>>(rest.xy),
         );
-        let e = edges_of(s);
-        let values = point_edges(s, e, corner);
-        let start = vec2(corner.x - s.x.x, corner.y - s.y.x);
-        a = nearer(a, ~x.w, depth_at_point(s, e, values, start, own.x), length);
+        a = nearer(a, ~rest.z, depth_at_point(triangle, own.x), length);
         if !is_few {
-            b = nearer(b, ~x.w, depth_at_point(s, e, values, start, own.x + WORKGROUP), length);
-            c = nearer(c, ~x.w, depth_at_point(s, e, values, start, own.x + 2u * WORKGROUP), length);
-            d = nearer(d, ~x.w, depth_at_point(s, e, values, start, own.x + 3u * WORKGROUP), length);
+            b = nearer(b, ~rest.z, depth_at_point(triangle, own.x + WORKGROUP), length);
+            c = nearer(c, ~rest.z, depth_at_point(triangle, own.x + 2u * WORKGROUP), length);
+            d = nearer(d, ~rest.z, depth_at_point(triangle, own.x + 3u * WORKGROUP), length);
         }
-        item = atomicLoad(&mixed[next_at(item)]);
+        item = rest.w;
         length++;
     }
     seen[own.x] = a.xy;

@@ -7,7 +7,6 @@
 // - by pixel, and one more on each side: the places where colours break off
 // - by number: the first item of the pixel's list of triangles, or LIST_END
 // - by number: the first of the pixel's parts, times PARTS_OF_PIXEL, and how many they are
-// - by item: the next one, or LIST_END
 // - by number, where lines are drawn: the points that see something, as stroke.wgsl numbers them; none where all do, or few
 //   points were enough
 
@@ -55,19 +54,19 @@ fn parts_at(number: u32) -> u32 {
     return list_at(band_pixels() + number);
 }
 
-// Index of the word that has the item after this one.
-fn next_at(item: u32) -> u32 {
-    return list_at(2u * band_pixels() + item);
-}
-
 // Index of the first word of the points of the pixel of this number.
 fn border_at(number: u32) -> u32 {
-    return next_at(batch.list_capacity + BORDER_WORDS * number);
+    return list_at(2u * band_pixels() + BORDER_WORDS * number);
 }
 
-// Index of the first vector of a part in the buffer of lists, where parts follow the items.
+// Index of the first vector of an item in the buffer of lists.
+fn item_at(i: u32) -> u32 {
+    return 4u * i;
+}
+
+// The same of a part: parts follow the items.
 fn part_at(i: u32) -> u32 {
-    return ITEM_VECTORS * batch.list_capacity + 2u * i;
+    return item_at(batch.list_capacity) + 2u * i;
 }
 
 // Index of the word with the breaks of a pixel, of the band or beside it.

@@ -28,30 +28,31 @@ fn draw_points(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
         return;
     }
     let corner = pixel_corner(pixel);
-    let start = vec2(corner.x - s.x.x, corner.y - s.y.x);
-    let c = point_edges(s, e, corner);
-    if is_beside(e, c) {
+    let values = point_edges(s, e, corner);
+    if is_beside(e, values) {
         return;
     }
+    let start = vec2(corner.x - s.x.x, corner.y - s.y.x);
+    let triangle = PointTriangle(values, e.dx, e.dy, start, s.depth, s.depth_range);
     let first = (slot - batch.slots_first) * POINTS;
     if (number & FEW) != 0u {
         for (var i = FEW_FIRST; i < POINTS; i += FEW_STEP) {
-            draw_point(s, e, c, start, i, first, id);
+            draw_point(triangle, i, first, id);
         }
         return;
     }
     // Four at a time: a thread may run few iterations only (src/backend/gpu/schedule/tiles.rs).
     for (var i = 0u; i < POINTS; i += 4u) {
-        draw_point(s, e, c, start, i, first, id);
-        draw_point(s, e, c, start, i + 1u, first, id);
-        draw_point(s, e, c, start, i + 2u, first, id);
-        draw_point(s, e, c, start, i + 3u, first, id);
+        draw_point(triangle, i, first, id);
+        draw_point(triangle, i + 1u, first, id);
+        draw_point(triangle, i + 2u, first, id);
+        draw_point(triangle, i + 3u, first, id);
     }
 }
 
-// Offers a triangle to point i of a pixel whose edge functions are c; start: the pixel's corner, seen from the triangle's first.
-fn draw_point(s: Setup, e: Edges, c: vec3<i32>, start: vec2<i32>, i: u32, first: u32, id: u32) {
-    let z = depth_at_point(s, e, c, start, i);
+// Offers a triangle to point i of a pixel, whose first point is in memory there.
+fn draw_point(triangle: PointTriangle, i: u32, first: u32, id: u32) {
+    let z = depth_at_point(triangle, i);
     if z > 0.0 {
         keep_nearest(first + i, z, id);
     }

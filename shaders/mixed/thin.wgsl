@@ -14,10 +14,8 @@ const LENGTH_MIN: i32 = 256;
 // Triangles of this length, 1/256 px, that are less than HEIGHT_MAX high are ASPECT times as long in any case.
 const LENGTH_MAX: i32 = 32768;
 
-// The workgroup's thin triangles, and how many steps there are along them, up to each. A step is a column or row of pixels:
-// threads take one after the other, because a few triangles may have most of them.
-var<workgroup> thin_count: atomic<u32>;
-var<workgroup> thin_ids: array<u32, WORKGROUP>;
+// Steps along the workgroup's thin triangles, up to each. A step is a column or row of pixels: threads take one after the
+// other, because a few triangles may have most of them.
 var<workgroup> ends: array<u32, WORKGROUP>;
 var<workgroup> step_count: u32;
 
@@ -29,18 +27,16 @@ fn thin(
 ) {
     // Several workgroups share the steps of the same triangles where there are few triangles.
     let group = workgroup.x + workgroup.y * groups.x;
-    let i = group / batch.groups_each * WORKGROUP + thread;
-    if thread == 0u {
-        atomicStore(&thin_count, 0u);
+    let first = group / batch.groups_each * WORKGROUP;
+    var steps = 0u;
+    if first + thread < batch.count {
+        steps = steps_along(batch.first + first + thread);
     }
-    workgroupBarrier();
-    if i < batch.count {
-        find_steps(batch.first + i);
-    }
+    ends[thread] = steps;
     workgroupBarrier();
     if thread == 0u {
         step_count = 0u;
-        for (var n = 0u; n < atomicLoad(&thin_count); n++) {
+        for (var n = 0u; n < WORKGROUP; n++) {
             step_count += ends[n];
             ends[n] = step_count;
         }
@@ -56,7 +52,7 @@ fn thin(
         if n > 0u {
             before = ends[n - 1u];
         }
-        let t = thin_ids[n];
+        let t = batch.first + first + n;
         let a = corner_on_screen(t, 0u);
         let b = corner_on_screen(t, 1u);
         let c = corner_on_screen(t, 2u);
@@ -64,25 +60,20 @@ fn thin(
     }
 }
 
-// Puts a triangle among the thin ones if it is one, with the number of its steps.
-fn find_steps(t: u32) {
+// How many steps there are along a triangle; none if it is not thin.
+fn steps_along(t: u32) -> u32 {
     let a = corner_on_screen(t, 0u);
     let b = corner_on_screen(t, 1u);
     let c = corner_on_screen(t, 2u);
     if a.x == OUTSIDE || b.x == OUTSIDE || c.x == OUTSIDE {
-        return;
+        return 0u;
     }
     let area = area_of(a, b, c);
     if !passes_culling(t, area) || !is_thin(vec3(a.x, b.x, c.x), vec3(a.y, b.y, c.y), area) {
-        return;
+        return 0u;
     }
     let way = way_along(setup_of(a, b, c, area));
-    let steps = way.last[way.axis] - way.first[way.axis] + 1;
-    if !way.is_empty && steps > 0 {
-        let n = atomicAdd(&thin_count, 1u);
-        thin_ids[n] = t;
-        ends[n] = u32(steps);
-    }
+    return select(u32(max(way.last[way.axis] - way.first[way.axis] + 1, 0)), 0u, way.is_empty);
 }
 
 fn is_thin(x: vec3<i32>, y: vec3<i32>, area: vec2<u32>) -> bool {

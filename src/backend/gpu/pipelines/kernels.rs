@@ -206,7 +206,7 @@ impl Kernel {
             }
             Self::MixedParts => {
                 let kernel = include_str!("../../../../shaders/mixed/mixed_parts.wgsl");
-                return [TRIANGLE, MIXED_PLACE, POINT_EDGES, MIXED_LATTICE, SHARES, POINT_SETS, kernel].concat();
+                return [MIXED_PLACE, MIXED_LATTICE, SHARES, POINT_SETS, kernel].concat();
             }
             Self::MixedSum => return [MIXED_PLACE, include_str!("../../../../shaders/mixed/mixed_sum.wgsl")].concat(),
             // Numbers of pixels alone.

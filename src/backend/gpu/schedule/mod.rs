@@ -10,7 +10,7 @@ pub(crate) mod step;
 #[cfg(test)]
 pub(crate) mod test_plans;
 pub(crate) mod tiles;
-use self::sizes::{Banding, DeviceTraits, has_visibility, is_painted};
+use self::sizes::{ALONE_SIZE, Banding, DeviceTraits, has_visibility, is_painted};
 use self::step::{Band, Goal, Step};
 use self::tiles::{Tiles, alone_size};
 use super::params::{Batch, edge_lists, faces_code};
@@ -341,7 +341,8 @@ impl Schedule {
             for first in ids.clone().step_by(CHUNK as usize) {
                 let (count, pass_bit) = (CHUNK.min(ids.end - first), u32::from(pass_bit));
                 let groups = count.div_ceil(WORKGROUP);
-                let groups_each = if device.loops_are_limited { 1 } else { THIN_WORKGROUPS.div_ceil(groups) };
+                let is_hardware = device.alone_size_of_few < ALONE_SIZE;
+                let groups_each = if is_hardware { THIN_WORKGROUPS.div_ceil(groups) } else { 1 };
                 let batch = Batch { first, count, faces: faces_code(faces), pass_bit, groups_each, ..pixels };
                 self.dispatch_groups(device, Kernel::Thin, groups * groups_each, batch)?;
                 if ids.len() > CHUNK as usize {

@@ -50,7 +50,7 @@ const LIST_ITEMS_MAX: u32 = 1 << 20;
 const PARTS_MAX: u32 = 1 << 19;
 
 /// Bytes of such an item, and of a part.
-const LIST_ITEM_BYTES: u64 = WORK_ITEM_BYTES;
+const LIST_ITEM_BYTES: u64 = 64;
 const PART_BYTES: u64 = 32;
 
 /// Bytes of a pixel of the picture.
@@ -165,7 +165,7 @@ impl Banding {
     pub fn mixed_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
         let [width, rows] = [plan.width_px, self.rows].map(u64::from);
         let border = if plan.lines.is_empty() { 0 } else { POINTS as u64 / 32 };
-        let words = (4 + border) * width * rows + (width + 2) * (rows + 2) + u64::from(self.list_capacity(plan));
+        let words = (4 + border) * width * rows + (width + 2) * (rows + 2);
         if plan.has_mixed() { MIXED_HEAD_BYTES + 4 * words } else { 0 }
     }
 
