@@ -9,13 +9,15 @@
 const IMAGE_VECTORS: u32 = 4u;
 
 // Bits of a texture use's sampler: a wrap mode across, one down, whether the nearest texel is taken,
-// and whether the second set of texture coordinates says where.
+// whether the second set of texture coordinates says where, and whether parts are cut out.
 const WRAP_BITS: u32 = 3u;
 const WRAP_DOWN_SHIFT: u32 = 2u;
 const WRAP_REPEAT: u32 = 0u;
 const WRAP_MIRROR: u32 = 1u;
 const SAMPLER_NEAREST: u32 = 16u;
 const SAMPLER_SECOND_UVS: u32 = 32u;
+// In place of alpha, texels say how much of a pixel is drawn.
+const SAMPLER_CUT_OUT: u32 = 64u;
 
 // Largest coordinate: beyond it f32 has too few fractional bits.
 const UV_MAX: f32 = 1048576.0;
@@ -94,13 +96,13 @@ fn sample_texture(m: u32, slot: u32, id: u32, b: Barycentrics, first_uv: Uv) -> 
     let taps_max = select(1u, TAPS_MAX, slot == SLOT_BASE || slot == SLOT_EMISSIVE);
     let footprint = footprint_of(image, used.sampler, taps_max, x, y);
     if footprint.taps < 2u {
-        return filtered(image, footprint.lod, at, used.sampler);
+        return place_color(image, footprint, at, used.sampler);
     }
     let share = quick_recip(f32(footprint.taps));
     var sum = vec4(0.0);
     for (var tap = 0u; tap < footprint.taps; tap++) {
         let along = rn((f32(tap) + 0.5) * share) - 0.5;
-        sum += filtered(image, footprint.lod, at + rn2(footprint.axis * along), used.sampler);
+        sum += place_color(image, footprint, at + rn2(footprint.axis * along), used.sampler);
     }
     return rn4(sum * share);
 }
@@ -113,6 +115,8 @@ struct Footprint {
     lod: f32,
     // The footprint's longer axis from end to end, in texture coordinates; 0 for one place.
     axis: vec2<f32>,
+    // Pixels per texel of the finest level, at least 1: for cut-out textures.
+    sharpness: f32,
 };
 
 // The footprint of a pixel whose step to the right, and down, is so many texels: the ellipse into which
@@ -120,9 +124,16 @@ struct Footprint {
 fn footprint_of(image: Image, sampler: u32, taps_max: u32, right: vec2<f32>, down: vec2<f32>) -> Footprint {
     let across = square_of(right);
     let along = square_of(down);
-    let one = Footprint(1u, lod_of(image, max(across, along)), vec2(0.0));
+    let is_measured = across + along < 1e12;
+    var sharpness = 1.0;
+    if (sampler & SAMPLER_CUT_OUT) != 0u && is_measured {
+        // Over all directions of a border, the mean square of a pixel's extent across it is half of both squares.
+        let finest = f32(1u << min(image.first_level, 31u));
+        sharpness = max(rn(finest * quick_rsqrt(max(rn(0.5 * (across + along)), 1e-30))), 1.0);
+    }
+    let one = Footprint(1u, lod_of(image, max(across, along)), vec2(0.0), sharpness);
     let is_small = across + along < 2.25;
-    if (sampler & SAMPLER_NEAREST) != 0u || is_small || !(across + along < 1e12) {
+    if (sampler & SAMPLER_NEAREST) != 0u || is_small || !is_measured {
         return one;
     }
     let diagonal = rn2(right * right) + rn2(down * down);
@@ -146,7 +157,7 @@ fn footprint_of(image: Image, sampler: u32, taps_max: u32, right: vec2<f32>, dow
     let scale = rn(long * quick_rsqrt(max(square_of(direction), 1e-30)));
     let size = vec2<f32>(image.size);
     let axis = rn2(rn2(direction * scale) * vec2(quick_recip(size.x), quick_recip(size.y)));
-    return Footprint(taps, lod_of(image, max(rn(step * step), rn(short * short))), axis);
+    return Footprint(taps, lod_of(image, max(rn(step * step), rn(short * short))), axis, sharpness);
 }
 
 fn square_of(v: vec2<f32>) -> f32 {
@@ -156,6 +167,23 @@ fn square_of(v: vec2<f32>) -> f32 {
 // The level at which texels are as large as so many of the first, squared.
 fn lod_of(image: Image, size_square: f32) -> f32 {
     return max(min(half_log2(size_square), f32(image.levels) - 1.0), f32(image.first_level));
+}
+
+// `Footprint.sharpness` of a texel that is drawn whole or not at all.
+const NEAREST_SHARPNESS: f32 = 4096.0;
+
+// A place of a footprint.
+fn place_color(image: Image, footprint: Footprint, at: vec2<f32>, sampler: u32) -> vec4<f32> {
+    let color = filtered(image, footprint.lod, at, sampler);
+    if (sampler & SAMPLER_CUT_OUT) == 0u {
+        return color;
+    }
+    var sharpness = footprint.sharpness;
+    if (sampler & SAMPLER_NEAREST) != 0u {
+        // Texels of the finest level are drawn whole or not at all.
+        sharpness = select(1.0, NEAREST_SHARPNESS, u32(footprint.lod + 0.5) == 0u);
+    }
+    return vec4(color.xyz, clamp(rn(color.w * sharpness) + 0.5, 0.0, 1.0));
 }
 
 fn filtered(image: Image, lod: f32, at: vec2<f32>, sampler: u32) -> vec4<f32> {

@@ -4,7 +4,7 @@
 //! their neighbours.
 
 use crate::limits::{Deadline, Stopped};
-use crate::texture::coverage;
+use crate::texture::cut_out;
 use crate::texture::decode::{LookupTable, Pixels};
 use half::f16;
 use rayon::prelude::*;
@@ -56,9 +56,14 @@ impl Reading {
         Self { is_color: true, cutoff_bits: if is_cut { cutoff.to_bits() } else { 0 } }
     }
 
+    /// True if texels below an alpha are left out.
+    pub fn is_cut_out(self) -> bool {
+        self.cutoff_bits != 0
+    }
+
     /// Memory that reading so takes beside [`working_bytes`], bytes.
     pub fn working_bytes(self, width: u32, height: u32) -> u64 {
-        if self.cutoff_bits == 0 { 0 } else { coverage::bytes(width, height) }
+        if self.cutoff_bits == 0 { 0 } else { cut_out::bytes(width, height) }
     }
 
     fn cutoff(self) -> Option<f32> {
@@ -66,7 +71,8 @@ impl Reading {
     }
 }
 
-/// Writes the levels from `first` on to `out`, as half floats.
+/// Writes the levels from `first` on to `out`, as half floats. In place of alpha, levels of a cut-out texture hold the
+/// distance from the border of what is drawn, in texels, at level 0; and half less than the share that is drawn at others.
 pub fn fill(
     pixels: &Pixels,
     reading: Reading,
@@ -75,6 +81,14 @@ pub fn fill(
     deadline: &Deadline,
 ) -> Result<(), Stopped> {
     let (width, height, is_color) = (pixels.width, pixels.height, reading.is_color);
+    // The alpha channel of a normal map or a metallic map has no meaning.
+    let by_alpha = is_color && pixels.has_alpha();
+    let lookup: LookupTable<f32> = pixels.lookup_table(is_color, |v| v);
+    let distances = match reading.cutoff().filter(|_| by_alpha) {
+        Some(cutoff) => Some(cut_out::distances(pixels, &lookup, cutoff, deadline)?),
+        None => None,
+    };
+    let distances_of = |y: usize| distances.as_ref().map(|all| &all[y * width as usize..][..width as usize]);
     if first == 0 {
         let table = pixels.lookup_table(is_color, half);
         let level = take(&mut out, [width, height]);
@@ -82,19 +96,18 @@ pub fn fill(
         rows.try_for_each(|(y, row)| {
             deadline.check()?;
             pixels.row(y as u32, &table, row);
+            let distances = distances_of(y).into_iter().flatten();
+            row.iter_mut().zip(distances).for_each(|(texel, &distance)| texel[3] = half(distance));
             Ok(())
         })?;
     }
     if count(width, height) == 1 {
         return Ok(());
     }
-    // The alpha channel of a normal map or a metallic map has no meaning.
-    let by_alpha = is_color && pixels.has_alpha();
-    let table: LookupTable<f32> = pixels.lookup_table(is_color, |v| v);
-    let read = |y, row: &mut [[f32; 4]]| pixels.row(y, &table, row);
-    let kept = match reading.cutoff().filter(|_| by_alpha) {
-        Some(cutoff) => Some((coverage::share(pixels, &table, cutoff, deadline)?, cutoff)),
-        None => None,
+    let read = |y, row: &mut [[f32; 4]]| {
+        pixels.row(y, &lookup, row);
+        let distances = distances_of(y as usize).into_iter().flatten();
+        row.iter_mut().zip(distances).for_each(|(texel, &distance)| texel[3] = cut_out::share(distance));
     };
     let steps = if by_alpha { 0 } else { square_steps([width, height]).min(first) };
     let (mut level, reached) = if steps > 1 {
@@ -106,8 +119,8 @@ pub fn fill(
         let size = [side(width, k), side(height, k)];
         if k >= first {
             let out = take(&mut out, size).par_iter_mut().with_min_len(ROWS_MIN << 10);
-            let factor = kept.map_or(1.0, |(share, cutoff)| coverage::factor(&level, size, share, cutoff));
-            out.zip(&level).for_each(|(out, &[r, g, b, a])| *out = [r, g, b, (a * factor).min(1.0)].map(half));
+            let less = if distances.is_some() { 0.5 } else { 0.0 };
+            out.zip(&level).for_each(|(out, &[r, g, b, a])| *out = [r, g, b, a - less].map(half));
         }
         if k + 1 == count(width, height) {
             break;

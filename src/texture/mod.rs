@@ -23,7 +23,7 @@
 //! An image that cannot be read is a warning ([`fault_warnings`]), and its materials are drawn without it.
 
 pub(crate) mod basis;
-pub(crate) mod coverage;
+pub(crate) mod cut_out;
 pub(crate) mod decode;
 pub(crate) mod fit;
 pub(crate) mod kept;

@@ -168,8 +168,15 @@ fn sample(
     for (place, is_needed, texture, is_color) in wanted {
         if let Some(texture) = texture.as_ref().filter(|_| is_needed) {
             let is_cut_out = place == slots::BASE && material.flags & flags::MASK != 0;
-            let reading = if is_cut_out { cut_out(material) } else { Reading::plain(is_color) };
+            let reading = if is_cut_out { cut_out(material, mesh) } else { Reading::plain(is_color) };
             match textures.load(texture, reading)? {
+                Some(texture) if reading.is_cut_out() => {
+                    // What is left of a pixel is its alpha; the material's own is in the cutoff.
+                    material.flags = material.flags & !flags::MASK | flags::BLEND;
+                    material.base_color[3] = 1.0;
+                    material.textures[place] =
+                        TextureUse { sampler: texture.sampler | super::samplers::CUT_OUT, ..texture };
+                }
                 Some(texture) => material.textures[place] = texture,
                 None => remove_texture(material, mesh, place),
             }
@@ -179,8 +186,11 @@ fn sample(
 }
 
 /// The reading of a base texture whose texels below the cutoff are left out. The material's own alpha
-/// multiplies theirs.
-fn cut_out(material: &ShadedMaterial) -> Reading {
+/// multiplies theirs. With alphas of vertices, no cutoff is that of the whole texture: then points are compared with it.
+fn cut_out(material: &ShadedMaterial, mesh: &Mesh) -> Reading {
+    if material.flags & flags::VERTEX_COLORS != 0 && mesh.colors.iter().any(|color| color[3] != 1.0) {
+        return Reading::plain(true);
+    }
     Reading::cut_out(material.alpha_cutoff / material.base_color[3])
 }
 

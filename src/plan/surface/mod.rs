@@ -144,6 +144,8 @@ pub mod samplers {
     pub const NEAREST: u32 = 16;
     /// The second set of texture coordinates.
     pub const SECOND_UVS: u32 = 32;
+    /// In place of alpha, texels say how much of a pixel is drawn: see [`mips`](crate::texture::mips::fill).
+    pub const CUT_OUT: u32 = 64;
     /// Places along the longer axis of a pixel's footprint that are looked at, at most.
     pub const TAPS_MAX: u32 = 8;
 
