@@ -74,7 +74,8 @@ const RESIDENT_BYTES_SOFTWARE: u64 = 64 << 20;
 const SPARE_BYTES: u64 = 512 << 20;
 const SPARE_BYTES_DISCRETE: u64 = 1 << 30;
 
-/// [`Gpu::alone_size_of_few`] of hardware: 4 px. Larger triangles are drawn by a workgroup each.
+/// [`Gpu::alone_size_of_few`] of hardware: 4 px for samples (1 px for points of mixed pixels). Larger triangles are drawn by a
+/// workgroup each.
 const ALONE_SIZE_OF_FEW: i32 = 1024;
 
 /// The reason once the device is lost.

@@ -109,7 +109,7 @@ pub fn page(rows: &[Row], machine: &Machine, effort: Effort, before: &str) -> St
          code with the renderers: a pixel is a unit square with a box filter, colour is blended in linear light, and a line is the set of \
          points within half its width of the visible part of an edge, with round ends. Errors are in steps of 1/255, over the \
          pixels that picture or truth touch. `cargo bench --bench accuracy -- --write` measures, and writes this page, \
-         [accuracy.json](accuracy.json) (every row, with a schema) and the plot.\n\n## Goals\n\n| # | measure | goal | measured |\n|---|---|---|---|\n",
+         [accuracy.json](accuracy.json) (every row, with a schema) and the plots.\n\n## Goals\n\n| # | measure | goal | measured |\n|---|---|---|---|\n",
     );
     for goal in &GOALS {
         let measured = match goal.by {
