@@ -40,8 +40,8 @@ use self::recorder::Recorder;
 use self::residents::{Found, Source};
 use self::schedule::Schedule;
 use self::schedule::sizes::{
-    DeviceTraits, MIXED_HEAD_BYTES, OWNER_BYTES, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes,
-    has_visibility, is_painted, occlusion_bytes, samples, work_bytes,
+    DeviceTraits, OWNER_BYTES, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, is_painted,
+    occlusion_bytes, samples, work_bytes,
 };
 use self::schedule::step::{Band, Goal, Step};
 use self::stage_clock::StageClock;
@@ -510,7 +510,6 @@ fn execute<'a>(
                     next = end;
                 }
             }
-            Step::ClearMixed => recorder.clear(Slot::Mixed, MIXED_HEAD_BYTES)?,
             Step::ClearPoints => recorder.clear(Slot::Points, schedule.banding.points_bytes(plan))?,
             Step::EndMixed { drawn, end } => {
                 if recorder.read_word(Slot::Mixed, 0)? <= drawn {

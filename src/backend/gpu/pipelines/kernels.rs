@@ -34,8 +34,8 @@ const SPREAD: &str = include_str!("../../../../shaders/occlusion/spread.wgsl");
 const SMALL: &str = include_str!("../../../../shaders/geometry/small.wgsl");
 const TILE_SAMPLES: &str = include_str!("../../../../shaders/geometry/tile_samples.wgsl");
 const MIXED_PLACE: &str = include_str!("../../../../shaders/mixed/place.wgsl");
-const SEEN_FACES: &str = include_str!("../../../../shaders/mixed/seen_faces.wgsl");
-const LOOK: &str = include_str!("../../../../shaders/mixed/look.wgsl");
+const SEEN_FACES: &str = include_str!("../../../../shaders/mixed/find/seen_faces.wgsl");
+const LOOK: &str = include_str!("../../../../shaders/mixed/find/look.wgsl");
 const POINT_EDGES: &str = include_str!("../../../../shaders/mixed/point_edges.wgsl");
 const MIXED_LATTICE: &str = include_str!("../../../../shaders/mixed/lattice.wgsl");
 const MIXED_POINTS: &str = include_str!("../../../../shaders/mixed/points.wgsl");
@@ -190,10 +190,10 @@ impl Kernel {
     fn mixed_source(self) -> String {
         let parts: &[&str] = match self {
             Self::Breaks => {
-                &[HULL, MIXED_PLACE, LOOK, SEEN_FACES, include_str!("../../../../shaders/mixed/breaks.wgsl")]
+                &[HULL, MIXED_PLACE, LOOK, SEEN_FACES, include_str!("../../../../shaders/mixed/find/breaks.wgsl")]
             }
             Self::Thin => {
-                let kernel = include_str!("../../../../shaders/mixed/thin.wgsl");
+                let kernel = include_str!("../../../../shaders/mixed/find/thin.wgsl");
                 &[HULL, CULLING, MIXED_PLACE, LOOK, SEEN_FACES, POINT_EDGES, kernel]
             }
             Self::MixedColor => {
@@ -210,7 +210,7 @@ impl Kernel {
             }
             Self::MixedSum => return [MIXED_PLACE, include_str!("../../../../shaders/mixed/mixed_sum.wgsl")].concat(),
             // Numbers of pixels alone.
-            _ => return [MIXED_PLACE, include_str!("../../../../shaders/mixed/mixed_pixels.wgsl")].concat(),
+            _ => return [MIXED_PLACE, include_str!("../../../../shaders/mixed/find/mixed_pixels.wgsl")].concat(),
         };
         [&[TRIANGLE], SHADE, parts].concat().concat()
     }

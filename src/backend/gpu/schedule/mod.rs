@@ -335,7 +335,6 @@ impl Schedule {
     /// The mixed pixels of a band.
     fn mixed(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, pixels: Batch) -> Result<(), DrawError> {
         let around = (plan.width_px + 2) * (pixels.row_first.abs_diff(pixels.row_end) + 2);
-        self.steps.push(Step::ClearMixed);
         self.dispatch(device, Kernel::Breaks, around, Batch { count: around, ..pixels })?;
         for Pass { ids, faces, pass_bit, .. } in Pass::of_visibility(plan).into_iter().flatten() {
             for first in ids.clone().step_by(CHUNK as usize) {

@@ -22,8 +22,6 @@ pub enum Step {
         /// Index of the step after the last layer.
         end: usize,
     },
-    /// Clears the number of mixed pixels.
-    ClearMixed,
     /// Clears what the points of mixed pixels see.
     ClearPoints,
     /// Reads how many mixed pixels there are and, if there are no more than so many, continues at step `end`.

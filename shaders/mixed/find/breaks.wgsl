@@ -9,6 +9,12 @@ fn breaks(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups
     if i >= batch.count {
         return;
     }
+    if i == 0u {
+        // Nothing of the band is counted yet.
+        for (var w = 0u; w < HEAD_WORDS; w++) {
+            mixed[w] = 0u;
+        }
+    }
     let columns = frame.width + 2;
     let pixel = vec2(i32(i) % columns - 1, batch.row_first - 1 + i32(i) / columns);
     let first = id_at(pixel, 0);
