@@ -1,7 +1,7 @@
 // Stage visibility, per tile of 64 x 64 pixels of a triangle that a workgroup draws: first each thread tests a
 // block of 8 x 8 pixels against the edges, then all threads together fill the blocks that are left, one thread per
 // pixel. Shared by visibility_tile.wgsl and visibility_few.wgsl. What a pixel's thread does is in tile_samples.wgsl
-// or, for mixed pixels, in mixed/points.wgsl. No twin: the CPU has one loop for all sizes.
+// or, for mixed pixels, in mixed/lists.wgsl. No twin: the CPU has one loop for all sizes.
 
 // Pixels along a side of a tile.
 const TILE_PX: i32 = 64;

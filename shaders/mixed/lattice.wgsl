@@ -20,7 +20,8 @@ fn point_place(i: u32) -> vec2<i32> {
 
 // A triangle, seen from a pixel.
 struct PointTriangle {
-    // Values of its edge functions at the pixel's first point, halved, and their changes down and, negated, to the right.
+    // Values of its edge functions at the pixel's first point, halved, and their changes down and, negated, to the
+    // right.
     values: vec3<i32>,
     dx: vec3<i32>,
     dy: vec3<i32>,

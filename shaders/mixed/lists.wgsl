@@ -25,7 +25,7 @@ fn draw_pixel(s: Setup, e: Edges, values: vec3<i32>, in_block: vec2<i32>, pixel:
 // Puts a triangle in front of a pixel's list if the pixel is mixed and the triangle may touch it.
 fn append(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
     let number = atomicLoad(&mixed[number_at(u32((pixel.y - batch.row_first) * frame.width + pixel.x))]);
-    if number == 0u {
+    if number == 0u || atomicLoad(&mixed[OVERFLOW]) != 0u {
         return;
     }
     let corner = pixel_corner(pixel);

@@ -1,11 +1,12 @@
-// Stage mixed, per mixed pixel: which triangle of its list each point sees, and so the parts that its colour is the sum of.
-// Twin of src/backend/cpu/mixed/color.rs and faces.rs. mixed_shade.wgsl finds the parts' colours, mixed_sum.wgsl adds them.
+// Stage mixed, per mixed pixel: the triangle of its list that each point sees, and so the parts that its colour is the
+// sum of. Twin of src/backend/cpu/mixed/color.rs and faces.rs. The parts' colours: mixed_shade.wgsl; their sum:
+// mixed_sum.wgsl.
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
 // Items of lists, then parts.
 @group(1) @binding(31) var<storage, read_write> lists: array<vec4<u32>>;
 
-// Longest list. A pixel that has a longer one is left out, and so is the picture.
+// Longest list. A picture in which a pixel has a longer one is drawn once more, without lists.
 const LIST_MAX: u32 = 4096u;
 
 var<workgroup> pixel_count: u32;
@@ -20,7 +21,7 @@ fn mixed_parts(
     @builtin(local_invocation_index) thread: u32,
 ) {
     if thread == 0u {
-        pixel_count = atomicLoad(&mixed[0]);
+        pixel_count = select(atomicLoad(&mixed[0]), 0u, atomicLoad(&mixed[OVERFLOW]) != 0u);
     }
     find_digit_sets(thread);
     let count = workgroupUniformLoad(&pixel_count);
@@ -43,7 +44,8 @@ fn write_parts(number: u32, thread: u32) {
         list_length = found.length;
     }
     let length = workgroupUniformLoad(&list_length);
-    let has_sets = length <= WORKGROUP;
+    // Pieces of a clipped triangle are several items, but one part.
+    let has_sets = length <= WORKGROUP && !has(CLIPPED);
     if has_sets {
         add_points(found.items, own);
         workgroupBarrier();

@@ -7,7 +7,8 @@
 
 @compute @workgroup_size(WORKGROUP)
 fn mixed_shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let count = min(mixed[PART_COUNT], batch.part_capacity);
+    // Without room for all parts some are not written, and the picture is drawn once more.
+    let count = select(mixed[PART_COUNT], 0u, mixed[OVERFLOW] != 0u);
     let threads = groups.x * groups.y * WORKGROUP;
     for (var i = gid.x + gid.y * groups.x * WORKGROUP; i < count; i += threads) {
         let part = lists[part_at(i)];

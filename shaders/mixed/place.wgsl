@@ -7,7 +7,8 @@
 // - by pixel, and one more on each side: the places where colours break off
 // - by number: the first item of the pixel's list of triangles, or LIST_END
 // - by number: the first of the pixel's parts, times PARTS_OF_PIXEL, and how many they are
-// - by number, where lines are drawn: the points that see something, as stroke.wgsl numbers them; none where all do, or few
+// - by number, where lines are drawn: the points that see something, as stroke.wgsl numbers them; none where all do, or
+// few
 //   points were enough
 
 const HEAD_WORDS: u32 = 4u;

@@ -1,6 +1,6 @@
 // Stage mixed, per pixel that a workgroup has in hand: the points that see each of its triangles, as sets. Twin of
-// src/backend/cpu/mixed/points.rs. Sets make the shares of up to as many triangles as there are threads; shares.wgsl looks
-// at all points of a pixel instead, for more.
+// src/backend/cpu/mixed/points.rs. Sets make the shares of up to as many triangles as there are threads; shares.wgsl
+// looks at all points of a pixel instead, for more.
 
 // By item of the pixel's list: the points that see it, a bit each.
 var<workgroup> sets: array<atomic<u32>, SETS_WORDS>;
@@ -15,7 +15,7 @@ fn find_digit_sets(thread: u32) {
     var word = 0u;
     for (var bit = 0u; bit < 32u; bit++) {
         let row = u32(point_place(32u * (thread % FIRSTS_WORDS) + bit).y);
-        word |= (row >> (thread / FIRSTS_WORDS) & 1u) << bit;
+        word |= ((row >> (thread / FIRSTS_WORDS)) & 1u) << bit;
     }
     digit_sets[thread] = word;
 }

@@ -40,15 +40,15 @@ fn is_first_of_all(p: u32, step: u32) -> bool {
 
 // True if p is the first point of a triangle, as found.
 fn is_first(p: u32) -> bool {
-    return (atomicLoad(&firsts[p / 32u]) >> (p % 32u) & 1u) != 0u;
+    return ((atomicLoad(&firsts[p / 32u]) >> (p % 32u)) & 1u) != 0u;
 }
 
-// How many triangles have a first point.
+// The number of triangles that have a first point.
 fn first_count() -> u32 {
     return firsts_before(POINTS);
 }
 
-// How many points before p are the first ones of a triangle.
+// The number of points before p that are the first ones of a triangle.
 fn firsts_before(p: u32) -> u32 {
     var count = 0u;
     for (var w = 0u; w < p / 32u; w++) {

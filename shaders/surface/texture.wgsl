@@ -169,9 +169,6 @@ fn lod_of(image: Image, size_square: f32) -> f32 {
     return max(min(half_log2(size_square), f32(image.levels) - 1.0), f32(image.first_level));
 }
 
-// `Footprint.sharpness` of a texel that is drawn whole or not at all.
-const NEAREST_SHARPNESS: f32 = 4096.0;
-
 // A place of a footprint.
 fn place_color(image: Image, footprint: Footprint, at: vec2<f32>, sampler: u32) -> vec4<f32> {
     let color = filtered(image, footprint.lod, at, sampler);
@@ -181,7 +178,10 @@ fn place_color(image: Image, footprint: Footprint, at: vec2<f32>, sampler: u32) 
     var sharpness = footprint.sharpness;
     if (sampler & SAMPLER_NEAREST) != 0u {
         // Texels of the finest level are drawn whole or not at all.
-        sharpness = select(1.0, NEAREST_SHARPNESS, u32(footprint.lod + 0.5) == 0u);
+        if u32(footprint.lod + 0.5) <= image.first_level {
+            return vec4(color.xyz, select(0.0, 1.0, color.w >= 0.0));
+        }
+        sharpness = 1.0;
     }
     return vec4(color.xyz, clamp(rn(color.w * sharpness) + 0.5, 0.0, 1.0));
 }

@@ -1,18 +1,18 @@
 //! Cut-out textures: the distance of each texel from the border between what is drawn and what is left out.
 //!
-//! A picture shows the share of each pixel that is drawn. From near, where texels are larger than pixels, that follows from the
-//! distance to the border and the size of the pixel. From afar it is the mean of the texels' own shares, which coarser
-//! levels hold. The mean of alphas says neither: its contrast falls from level to level, so that leaves and lattices would
-//! vanish, or close up.
+//! A picture shows the share of each pixel that is drawn. From near, where texels are larger than pixels, that follows
+//! from the distance to the border and the size of the pixel. From afar it is the mean of the texels' own shares, which
+//! coarser levels hold. The mean of alphas says neither: its contrast falls from level to level, so that leaves and
+//! lattices would vanish, or close up.
 
 use rayon::prelude::*;
 
 use crate::limits::{Deadline, Stopped};
 use crate::texture::decode::{LookupTable, Pixels};
 
-/// The distance of each texel's middle from the border of what is drawn, in texels: positive where alpha reaches the cutoff.
-/// At most 1 and at least -1. It is the difference from the cutoff over the steepest change of alpha to the texels beside
-/// it.
+/// The distance of each texel's middle from the border of what is drawn, in texels: positive where alpha reaches the
+/// cutoff. At most 1 and at least -1. It is the difference from the cutoff over the steepest change of alpha to the
+/// texels beside it.
 pub fn distances(
     pixels: &Pixels,
     table: &LookupTable<f32>,
@@ -46,7 +46,7 @@ pub fn distances(
 /// The distance where alpha exceeds the cutoff by so much, and changes so much from texel to texel.
 fn distance_of(excess: f32, [across, down]: [f32; 2]) -> f32 {
     let change = (across * across + down * down).sqrt();
-    // Where alpha does not change there is no border nearby.
+    // There is no border nearby if alpha does not change.
     if excess.abs() < change {
         excess / change
     } else if excess >= 0.0 {

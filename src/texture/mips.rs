@@ -28,11 +28,11 @@ pub fn side(texels: u32, level: u32) -> u32 {
 }
 
 /// Memory that [`fill`] takes beside its result, bytes: levels 1 and 2 as f32, the rows of
-/// all pieces, and the lookup tables.
+/// all pieces, and the lookup tables, of f32 and of halves.
 pub fn working_bytes(width: u32, height: u32) -> u64 {
     let texels = |level| u64::from(side(width, level)) * u64::from(side(height, level));
     let pieces = u64::from(side(height, 1)).div_ceil(ROWS_MIN as u64);
-    (texels(1) + texels(2)).saturating_mul(16).saturating_add(64 * pieces * u64::from(width) + (4 << 16))
+    (texels(1) + texels(2)).saturating_mul(16).saturating_add(64 * pieces * u64::from(width) + (6 << 16))
 }
 
 /// The ways in which an image is read.
@@ -72,7 +72,8 @@ impl Reading {
 }
 
 /// Writes the levels from `first` on to `out`, as half floats. In place of alpha, levels of a cut-out texture hold the
-/// distance from the border of what is drawn, in texels, at level 0; and half less than the share that is drawn at others.
+/// distance from the border of what is drawn, in texels, at level 0; and half less than the share that is drawn at
+/// others.
 pub fn fill(
     pixels: &Pixels,
     reading: Reading,

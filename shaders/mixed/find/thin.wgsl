@@ -14,8 +14,8 @@ const LENGTH_MIN: i32 = 256;
 // Triangles of this length, 1/256 px, that are less than HEIGHT_MAX high are ASPECT times as long in any case.
 const LENGTH_MAX: i32 = 32768;
 
-// Steps along the workgroup's thin triangles, up to each. A step is a column or row of pixels: threads take one after the
-// other, because a few triangles may have most of them.
+// Steps along the workgroup's thin triangles, up to each. A step is a column or row of pixels: threads take one after
+// the other, because a few triangles may have most of them.
 var<workgroup> ends: array<u32, WORKGROUP>;
 var<workgroup> step_count: u32;
 
@@ -43,7 +43,8 @@ fn thin(
     }
     let count = workgroupUniformLoad(&step_count);
     var n = 0u;
-    for (var step = group % batch.groups_each * WORKGROUP + thread; step < count; step += batch.groups_each * WORKGROUP) {
+    let stride = batch.groups_each * WORKGROUP;
+    for (var step = group % batch.groups_each * WORKGROUP + thread; step < count; step += stride) {
         // Steps of a thread go up, and so do the triangles that they are of.
         while step >= ends[n] {
             n++;
@@ -60,7 +61,7 @@ fn thin(
     }
 }
 
-// How many steps there are along a triangle; none if it is not thin.
+// The number of steps along a triangle; 0 if it is not thin.
 fn steps_along(t: u32) -> u32 {
     let a = corner_on_screen(t, 0u);
     let b = corner_on_screen(t, 1u);

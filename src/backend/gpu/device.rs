@@ -51,6 +51,7 @@ pub struct Gpu {
     jobs: AtomicUsize,
     /// Jobs that it has drawn together with others.
     jobs_shared: AtomicUsize,
+    pictures_drawn_again: AtomicUsize,
 }
 
 /// A job that a device draws, until this is dropped.
@@ -74,8 +75,8 @@ const RESIDENT_BYTES_SOFTWARE: u64 = 64 << 20;
 const SPARE_BYTES: u64 = 512 << 20;
 const SPARE_BYTES_DISCRETE: u64 = 1 << 30;
 
-/// [`Gpu::alone_size_of_few`] of hardware: 4 px for samples (1 px for points of mixed pixels). Larger triangles are drawn by a
-/// workgroup each.
+/// [`Gpu::alone_size_of_few`] of hardware: 4 px for samples (1 px for points of mixed pixels). Larger triangles are
+/// drawn by a workgroup each.
 const ALONE_SIZE_OF_FEW: i32 = 1024;
 
 /// The reason once the device is lost.
@@ -161,6 +162,7 @@ impl Gpu {
             renderers: AtomicUsize::new(0),
             jobs: AtomicUsize::new(0),
             jobs_shared: AtomicUsize::new(0),
+            pictures_drawn_again: AtomicUsize::new(0),
         })
     }
 
@@ -174,8 +176,8 @@ impl Gpu {
         self.residents.bytes()
     }
 
-    /// Memory of the buffers of jobs, on the device or where both sides reach it, kept for the next ones, bytes. None is kept without a
-    /// renderer.
+    /// Memory of the buffers of jobs, on the device or where both sides reach it, kept for the next ones, bytes. None
+    /// is kept without a renderer.
     pub fn spare_bytes(&self) -> u64 {
         self.spare_buffers.bytes() + self.handles.readbacks.bytes()
     }
@@ -195,8 +197,20 @@ impl Gpu {
         self.jobs_shared.load(Ordering::Relaxed)
     }
 
-    /// True if jobs that come while it is busy may share dispatches. A software device gains nothing by that, and does so
-    /// only where it behaves as hardware, for tests.
+    /// Pictures so far that were drawn once more, because the lists of mixed pixels had no room.
+    pub fn pictures_drawn_again(&self) -> usize {
+        self.pictures_drawn_again.load(Ordering::Relaxed)
+    }
+
+    /// To be called before such a picture is drawn once more. The room of its lists is freed, so that the picture never
+    /// has both kinds of buffers.
+    pub(super) fn picture_overflowed(&self) {
+        self.pictures_drawn_again.fetch_add(1, Ordering::Relaxed);
+        self.spare_buffers.clear();
+    }
+
+    /// True if jobs that come while it is busy may share dispatches. A software device gains nothing by that, and does
+    /// so only where it behaves as hardware, for tests.
     pub(super) fn draws_gangs(&self) -> bool {
         self.handles.maps_storage && self.alone_size_of_few < ALONE_SIZE
     }

@@ -210,6 +210,7 @@ impl GpuRenderer {
             Some(drawn) => drawn,
             None => {
                 tracing::debug!("mixed pixels have more triangles than their lists have room for");
+                self.gpu.picture_overflowed();
                 let drawn = self.draw_alone(plan, deadline, drawing.is_alone, false)?;
                 drawn.ok_or_else(|| DrawError::Device("it found no room where none is needed".to_owned()))?
             }
@@ -219,8 +220,8 @@ impl GpuRenderer {
         Ok(Image { rgba, ..image })
     }
 
-    /// A picture's pixels, drawn with buffers of its own, and the times of its stages if they are asked for. None if mixed
-    /// pixels were to have lists and there was no room for them.
+    /// A picture's pixels, drawn with buffers of its own, and the times of its stages if they are asked for. None if
+    /// mixed pixels were to have lists and there was no room for them.
     fn draw_alone(
         &self,
         plan: &DrawPlan<'_>,
@@ -413,8 +414,8 @@ fn upload_shading(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedul
     if plan.has_mixed() {
         buffers.reserve(&gpu.handles, Slot::Mixed, schedule.banding.mixed_bytes(plan))?;
         buffers.reserve(&gpu.handles, Slot::Lists, schedule.banding.lists_bytes(plan))?;
-        // It is all zeros when a job begins: mixed_color.wgsl clears what it reads, a new buffer is clear, and a job that
-        // fails does not give its buffers back.
+        // It is all zeros when a job begins: mixed_color.wgsl clears what it reads, a new buffer is clear, and a job
+        // that fails does not give its buffers back.
         buffers.reserve(&gpu.handles, Slot::Points, schedule.banding.points_bytes(plan))?;
     }
     if plan.occlusion.is_some() {

@@ -6,8 +6,9 @@ use crate::mesh::material::Wrap;
 use crate::texture::decode::Pixels;
 use crate::texture::mips;
 
-/// Distance from a texel's square at which it is still blended with its neighbours, texels; a little more.
-const BESIDE: f64 = 0.51;
+/// Distance from a texel's square at which something of it shows, texels: its border may lie in the middle of the next texel,
+/// and is a pixel wide, which is no more than a texel of the level that is looked at.
+const BESIDE: f64 = 1.01;
 
 /// Copies of the image that a triangle may reach along each axis. One that reaches more meets something.
 const TILES_MAX: i64 = 4;

@@ -38,7 +38,8 @@ pub fn shaded_material(
     Ok(material)
 }
 
-/// Takes textures from a material, those of these indices, which are in order. It looks as if its file did not mention them.
+/// Takes textures from a material, those of these indices, which are in order. It looks as if its file did not mention
+/// them.
 pub fn remove_textures(material: &mut ShadedMaterial, mesh: &Mesh, indices: &[u32]) {
     for place in 0..material.textures.len() {
         if indices.binary_search(&material.textures[place].texture).is_ok() {
@@ -168,10 +169,10 @@ fn sample(
     for (place, is_needed, texture, is_color) in wanted {
         if let Some(texture) = texture.as_ref().filter(|_| is_needed) {
             let is_cut_out = place == slots::BASE && material.flags & flags::MASK != 0;
-            let reading = if is_cut_out { cut_out(material, mesh) } else { Reading::plain(is_color) };
+            let reading = if is_cut_out { cut_out(material, textures) } else { Reading::plain(is_color) };
             match textures.load(texture, reading)? {
                 Some(texture) if reading.is_cut_out() => {
-                    // What is left of a pixel is its alpha; the material's own is in the cutoff.
+                    // Alpha is what is left of a pixel. The material's own is in the cutoff.
                     material.flags = material.flags & !flags::MASK | flags::BLEND;
                     material.base_color[3] = 1.0;
                     material.textures[place] =
@@ -186,9 +187,10 @@ fn sample(
 }
 
 /// The reading of a base texture whose texels below the cutoff are left out. The material's own alpha
-/// multiplies theirs. With alphas of vertices, no cutoff is that of the whole texture: then points are compared with it.
-fn cut_out(material: &ShadedMaterial, mesh: &Mesh) -> Reading {
-    if material.flags & flags::VERTEX_COLORS != 0 && mesh.colors.iter().any(|color| color[3] != 1.0) {
+/// multiplies theirs. Where vertices have alphas no cutoff is that of the whole texture: then points are compared with
+/// it.
+fn cut_out(material: &ShadedMaterial, textures: &TextureLoader<'_>) -> Reading {
+    if material.flags & flags::VERTEX_COLORS != 0 && textures.has_vertex_alpha() {
         return Reading::plain(true);
     }
     Reading::cut_out(material.alpha_cutoff / material.base_color[3])

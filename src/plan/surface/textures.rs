@@ -1,6 +1,7 @@
 //! Images to textures: decoded only if sampled, once per way of reading them, and only as large as
 //! the picture can show.
 
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -36,6 +37,8 @@ pub struct TextureLoader<'a> {
     /// Index into `wanted` by image and way of reading; None for an image that cannot be read.
     known: BTreeMap<(u32, Reading), Option<usize>>,
     uses: Vec<Use>,
+    /// True if some vertex has an alpha, once that is asked for.
+    has_vertex_alpha: OnceCell<bool>,
     /// By image.
     faults: BTreeMap<u32, TextureError>,
 }
@@ -70,6 +73,7 @@ impl<'a> TextureLoader<'a> {
             wanted: Vec::new(),
             known: BTreeMap::new(),
             uses: Vec::new(),
+            has_vertex_alpha: OnceCell::new(),
             faults: BTreeMap::new(),
         }
     }
@@ -79,6 +83,11 @@ impl<'a> TextureLoader<'a> {
     pub fn for_material(&mut self, material: usize, is_used: bool) {
         self.material = material as u32;
         self.is_used = is_used;
+    }
+
+    /// True if the colour of some vertex is not opaque. All vertices are looked at once, however many materials ask.
+    pub fn has_vertex_alpha(&self) -> bool {
+        *self.has_vertex_alpha.get_or_init(|| self.mesh.colors.iter().any(|color| color[3] != 1.0))
     }
 
     /// A texture for a material. None if the picture has to go on without it.

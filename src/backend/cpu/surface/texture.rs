@@ -206,9 +206,14 @@ fn averaged(texels: &[[u16; 4]], image: &Texture, footprint: Footprint, at: [f32
     let is_cut_out = sampler & samplers::CUT_OUT != 0;
     if sampler & samplers::NEAREST != 0 {
         let level = (lod + 0.5) as u32;
-        let color = nearest(texels, Level::of(image, level), at, sampler);
+        let [r, g, b, alpha] = nearest(texels, Level::of(image, level), at, sampler);
         // Texels of the finest level are drawn whole or not at all.
-        return if is_cut_out { cut_out(color, if level == 0 { NEAREST_SHARPNESS } else { 1.0 }) } else { color };
+        let is_whole = is_cut_out && level <= image.first_level;
+        return match alpha {
+            distance if is_whole => [r, g, b, if distance >= 0.0 { 1.0 } else { 0.0 }],
+            share if is_cut_out => cut_out([r, g, b, share], 1.0),
+            alpha => [r, g, b, alpha],
+        };
     }
     let share_of_next = lod - (lod as u32) as f32;
     let level = Level::of(image, lod as u32);
@@ -230,9 +235,6 @@ fn averaged(texels: &[[u16; 4]], image: &Texture, footprint: Footprint, at: [f32
     }
     sum.map(|v| v * share)
 }
-
-/// [`Footprint::sharpness`] of a texel that is drawn whole or not at all.
-pub const NEAREST_SHARPNESS: f32 = 4096.0;
 
 /// A colour of a cut-out texture: alpha is the share of the pixel that is drawn.
 #[inline(always)]

@@ -115,7 +115,7 @@ impl Kernel {
 
     fn own_source(self) -> String {
         let keep_nearest = |write: SampleWrite| if write == SampleWrite::Both { SAMPLES_64 } else { SAMPLES_32 };
-        // Where what is found goes and how, and what of a triangle is found: first of small ones, then in tiles.
+        // The place to which results go, and what of a triangle is found: first of small ones, then in tiles.
         let emit = |write: SampleWrite, target: SampleTarget, by_size: &str| match target {
             SampleTarget::Visibility => [keep_nearest(write), SAMPLES, EMIT, by_size].concat(),
             SampleTarget::Layer => [keep_nearest(write), SAMPLES, PEEL_STATE, EMIT_LAYER, by_size].concat(),
@@ -243,7 +243,7 @@ impl Kernel {
             Self::Thin => SHADED | key::PASS_MASKS,
             Self::MixedPixels => 0,
             Self::MixedColor => SHADED | key::OCCLUSION | key::LINES,
-            Self::MixedParts => key::LINES,
+            Self::MixedParts => key::LINES | key::CLIPPED,
             Self::MixedShade => SHADED | key::OCCLUSION,
             Self::MixedSum => 0,
             Self::VisibilityFew { .. } => key::SAMPLES | key::PASS_MASKS | key::GANG,

@@ -34,16 +34,16 @@ pub const PIECES_MAX: u32 = 6;
 /// surface and 16 layers, filled and hull, in two phases: 17 * 77 * 2 * 2 = 5236. A pass of 30
 /// million edges that may be long is 229 chunks and three more for its coverage; 48 such passes are
 /// 11,136. That makes 0.52 million; a job with more is refused. Margin rows are no bands of their own
-/// and do not add to it. Mixed pixels, which exclude layers, take less: 512 rounds of 77 chunks, filled and hull, in two
-/// phases are 158,000.
+/// and do not add to it. Mixed pixels, which exclude layers, take less: 512 rounds of 77 chunks, filled and hull, in
+/// two phases are 158,000.
 const BATCHES_MAX: usize = 1 << 19;
 
-/// Rounds of mixed pixels that are queued on a real device before their number is read back. Waiting for it takes longer
-/// than a few empty rounds.
+/// Rounds of mixed pixels that are queued on a real device before their number is read back. Waiting for it takes
+/// longer than a few empty rounds.
 const ROUNDS_QUEUED: u32 = 8;
 
-/// Mixed pixels that a workgroup of a real device colours, one after the other. On software it colours one: a thread may
-/// run 1,600 iterations for a pixel of 256 triangles, and thousands more to shade its share of them.
+/// Mixed pixels that a workgroup of a real device colours, one after the other. On software it colours one: a thread
+/// may run 1,600 iterations for a pixel of 256 triangles, and thousands more to shade its share of them.
 const PIXELS_EACH: u32 = 16;
 
 /// Workgroups of a real device that look for thin triangles, at least: a few triangles may be thin and long.
@@ -52,8 +52,8 @@ const THIN_WORKGROUPS: u32 = 2048;
 /// Workgroups of a real device that find the parts of mixed pixels, at most.
 const PARTS_WORKGROUPS: u32 = 4096;
 
-/// Pixels that have lists, for a workgroup on software: a thread runs 4,096 iterations for the longest list, and as many again for
-/// its points.
+/// Pixels that have lists, for a workgroup on software: a thread runs 4,096 iterations for the longest list, and as
+/// many again for its points.
 const LISTS_EACH_SOFTWARE: u32 = 4;
 
 /// Samples that a thread of the transform stage empties, at most.

@@ -18,8 +18,8 @@ pub const HUGE_PX: u32 = 128;
 /// Fewer triangles than this in a dispatch leave most of a large GPU idle if each is drawn by one thread.
 const FEW_TRIANGLES: u32 = 1 << 15;
 
-/// The size of the largest triangle that a thread of a real GPU offers to mixed pixels by itself where there are few, 1/256
-/// px: each pixel has up to 256 points.
+/// The size of the largest triangle that a thread of a real GPU offers to mixed pixels by itself where there are few,
+/// 1/256 px: each pixel has up to 256 points.
 const ALONE_SIZE_OF_POINTS: i32 = 256;
 
 /// No more triangles than this in a dispatch are drawn by workgroups alone, without a work list.
@@ -53,7 +53,8 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// For the bands of a plan, and so many iterations of a thread's loop per pixel: one for each sample, or for four points.
+    /// For the bands of a plan, and so many iterations of a thread's loop per pixel: one for each sample, or for four
+    /// points.
     pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, banding: Banding, tests_each: u64) -> Self {
         let seen = [banding.seen_columns(plan), banding.seen_rows(plan)];
         let pixels = u64::from(seen[0]) * u64::from(seen[1].max(plan.height_px));

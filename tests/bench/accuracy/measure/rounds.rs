@@ -81,8 +81,8 @@ pub fn measure(scene: &Scene, effort: Effort, back_ends: &mut [BackEnd]) -> Vec<
     rows
 }
 
-/// A GPU that has been idle for as long as the CPU draws all cases takes three to five times as long at first, because its clock
-/// is low (docs/gpu-notes.md). So long it draws before its cases are timed.
+/// A GPU that has been idle for as long as the CPU draws all cases takes three to five times as long at first, because
+/// its clock is low (docs/gpu-notes.md). So long it draws before its cases are timed.
 const AWAKE_AFTER: Duration = Duration::from_millis(50);
 
 /// Each case on each back-end, once to warm up and then in turn; and the baseline's median on the

@@ -183,23 +183,36 @@ fn large_pictures_are_drawn_in_rounds_and_bands() {
     Likeness::of(&found, &want).assert(Tolerance::TWINS, "2000 x 1200 px");
 }
 
-/// More triangles in a few pixels than lists have room for, and in a single one; and so many in each that they are told apart
-/// in another way. A GPU's lists have room for 262,144 triangles of small pictures, 4,096 of a pixel, and 64 are told apart as
-/// sets.
+/// More triangles in a few pixels than lists have room for, and in a single one; and so many in each that they are told
+/// apart in another way. A GPU's lists have room for 262,144 triangles of small pictures, and 4,096 of a pixel; 64 are told
+/// apart as sets. Pictures that need more room are drawn once more.
 #[test]
 fn crowded_pixels_have_the_same_bytes() {
     let (mut plain, mut quick) = (CpuRenderer::plain(1), CpuRenderer::new(2));
     let mut gpus: Vec<GpuRenderer> = gpus().into_iter().flatten().map(|gpu| GpuRenderer::new(gpu.clone())).collect();
-    for (count, size) in [(520, "2"), (520, "9"), (120, "2"), (60, "9"), (24, "9")] {
+    for (count, size, is_again) in [
+        (520, "2", true),
+        (520, "9", true),
+        (120, "2", true),
+        (60, "9", false),
+        (24, "9", false),
+        // Many pixels, so that their points are drawn in several rounds.
+        (520, "420", true),
+    ] {
         let mesh = scenes::mesh(&shapes::torus(count));
         let keys = [("size", size), ("style", "flat"), ("samples", "adaptive"), ("camera.margin", "0")];
+        let all_borders = [("surface.debug", "face-orientation")];
+        let keys = [&keys[..], if size == "420" { &all_borders } else { &[] }].concat();
         let plan = scenes::plan(&mesh, &scenes::spec(&keys));
         let (want, name) = (draw(&mut plain, &plan), format!("torus of {count}, {size} px"));
         let mixed = plain.draw_times().mixed_pixels;
         assert!(draw(&mut quick, &plan) == want, "{name}");
         assert!(mixed >= 4, "{name}");
+        assert!(size != "420" || mixed > 2 * 32_768, "{mixed} mixed pixels are one round");
         for gpu in &mut gpus {
+            let before = gpu.gpu().pictures_drawn_again();
             let found = draw(gpu, &plan);
+            assert_eq!(gpu.gpu().pictures_drawn_again() - before, usize::from(is_again), "{name}");
             assert_eq!(gpu.draw_times().mixed_pixels, mixed, "{name}");
             Likeness::of(&found, &want).assert(Tolerance::TWINS, &name);
         }

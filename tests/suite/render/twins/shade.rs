@@ -23,6 +23,7 @@ const BUMPS: u32 = 1;
 const COARSE: u32 = 2;
 const FLAT: u32 = flags::FILL | flags::FACE_NORMALS;
 const SECOND: u32 = samplers::SECOND_UVS;
+const CUT_OUT: u32 = samplers::CUT_OUT;
 const SMOOTH: u32 = flags::FILL | flags::VERTEX_NORMALS;
 
 const LOOKS: &[Look] = &[
@@ -49,6 +50,10 @@ const LOOKS: &[Look] = &[
         m.flags = SMOOTH | flags::MASK | flags::BLEND | flags::VERTEX_COLORS;
         (m.alpha_cutoff, m.textures[slots::BASE]) = (0.3, used(CHECKER, 0));
     }),
+    ("texture cut out", |m| m.textures[slots::BASE] = cut_out(m, used(CHECKER, CUT_OUT))),
+    ("texture cut out, nearest", |m| m.textures[slots::BASE] = cut_out(m, used(CHECKER, CUT_OUT | 16))),
+    ("texture cut out, far", |m| m.textures[slots::BASE] = cut_out(m, turned(CHECKER, 40.0))),
+    ("texture cut out, coarse", |m| m.textures[slots::BASE] = cut_out(m, turned(COARSE, 0.2))),
     ("metallic-roughness texture", |m| {
         (m.flags, m.metallic, m.textures[slots::METALLIC_ROUGHNESS]) = (SMOOTH, 1.0, used(CHECKER, 0));
     }),
@@ -127,7 +132,7 @@ fn every_look_agrees() {
         }
     });
     assert_eq!(cases, LOOKS.len() * truth::cases(1, 3));
-    assert_eq!(LOOKS.len(), 39);
+    assert_eq!(LOOKS.len(), 43);
 }
 
 #[test]
@@ -310,6 +315,12 @@ fn base_look() -> ShadedMaterial {
 fn with(mut look: ShadedMaterial, change: fn(&mut ShadedMaterial)) -> ShadedMaterial {
     change(&mut look);
     look
+}
+
+/// The use of a cut-out texture, and the bits of a material that has one.
+fn cut_out(material: &mut ShadedMaterial, texture: TextureUse) -> TextureUse {
+    material.flags = FLAT | flags::BLEND;
+    TextureUse { sampler: texture.sampler | CUT_OUT, ..texture }
 }
 
 fn used(texture: u32, sampler: u32) -> TextureUse {
