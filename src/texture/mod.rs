@@ -9,7 +9,7 @@
 //! - [`basis`]: KTX2 files with Basis Universal data.
 //! - [`png`]: drops a PNG's ancillary chunks before the decoder reads them.
 //! - [`mips`]: makes the levels of one image.
-//! - [`coverage`]: keeps cut-outs as wide at coarse levels as they are.
+//! - [`cut_out`]: the distance of texels from the border of what is cut out.
 //! - [`fit`]: chooses the finest level of each image, so that all textures of a picture fit.
 //! - [`kept`]: a mesh's decoded images, from one picture to the next.
 //!
