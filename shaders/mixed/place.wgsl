@@ -8,8 +8,7 @@
 // - by number: the first item of the pixel's list of triangles, or LIST_END
 // - by number: the first of the pixel's parts, times PARTS_OF_PIXEL, and how many they are
 // - by number, where lines are drawn: the points that see something, as stroke.wgsl numbers them; none where all do, or
-// few
-//   points were enough
+//   few points were enough
 
 const HEAD_WORDS: u32 = 4u;
 

@@ -116,7 +116,7 @@ struct Footprint {
     // The footprint's longer axis from end to end, in texture coordinates; 0 for one place.
     axis: vec2<f32>,
     // Pixels per texel of the finest level, at least 1: for cut-out textures.
-    sharpness: f32,
+    magnification: f32,
 };
 
 // The footprint of a pixel whose step to the right, and down, is so many texels: the ellipse into which
@@ -125,13 +125,13 @@ fn footprint_of(image: Image, sampler: u32, taps_max: u32, right: vec2<f32>, dow
     let across = square_of(right);
     let along = square_of(down);
     let is_measured = across + along < 1e12;
-    var sharpness = 1.0;
+    var magnification = 1.0;
     if (sampler & SAMPLER_CUT_OUT) != 0u && is_measured {
         // Over all directions of a border, the mean square of a pixel's extent across it is half of both squares.
         let finest = f32(1u << min(image.first_level, 31u));
-        sharpness = max(rn(finest * quick_rsqrt(max(rn(0.5 * (across + along)), 1e-30))), 1.0);
+        magnification = max(rn(finest * quick_rsqrt(max(rn(0.5 * (across + along)), 1e-30))), 1.0);
     }
-    let one = Footprint(1u, lod_of(image, max(across, along)), vec2(0.0), sharpness);
+    let one = Footprint(1u, lod_of(image, max(across, along)), vec2(0.0), magnification);
     let is_small = across + along < 2.25;
     if (sampler & SAMPLER_NEAREST) != 0u || is_small || !is_measured {
         return one;
@@ -157,7 +157,7 @@ fn footprint_of(image: Image, sampler: u32, taps_max: u32, right: vec2<f32>, dow
     let scale = rn(long * quick_rsqrt(max(square_of(direction), 1e-30)));
     let size = vec2<f32>(image.size);
     let axis = rn2(rn2(direction * scale) * vec2(quick_recip(size.x), quick_recip(size.y)));
-    return Footprint(taps, lod_of(image, max(rn(step * step), rn(short * short))), axis, sharpness);
+    return Footprint(taps, lod_of(image, max(rn(step * step), rn(short * short))), axis, magnification);
 }
 
 fn square_of(v: vec2<f32>) -> f32 {
@@ -175,15 +175,15 @@ fn place_color(image: Image, footprint: Footprint, at: vec2<f32>, sampler: u32) 
     if (sampler & SAMPLER_CUT_OUT) == 0u {
         return color;
     }
-    var sharpness = footprint.sharpness;
+    var magnification = footprint.magnification;
     if (sampler & SAMPLER_NEAREST) != 0u {
         // Texels of the finest level are drawn whole or not at all.
         if u32(footprint.lod + 0.5) <= image.first_level {
             return vec4(color.xyz, select(0.0, 1.0, color.w >= 0.0));
         }
-        sharpness = 1.0;
+        magnification = 1.0;
     }
-    return vec4(color.xyz, clamp(rn(color.w * sharpness) + 0.5, 0.0, 1.0));
+    return vec4(color.xyz, clamp(rn(color.w * magnification) + 0.5, 0.0, 1.0));
 }
 
 fn filtered(image: Image, lod: f32, at: vec2<f32>, sampler: u32) -> vec4<f32> {

@@ -4,7 +4,7 @@
 //!     cargo bench --bench gpu                              # bumpy tori of 70 k and 1 M triangles, 512 px
 //!     cargo bench --bench gpu -- --mesh bunny.obj --look flat --size 256 --workers 16 --rounds 200
 //!     cargo bench --bench gpu -- --samples adaptive
-//!     cargo bench --bench gpu -- --samples 4,16,adaptive --pause-ms 20    # in turns, as when pictures are asked for now and then
+//!     cargo bench --bench gpu -- --samples 4,16,adaptive --pause-ms 20    # in turns, asked for now and then
 //!     cargo bench --bench gpu -- --copy yes                # with a copy of each picture, as if none were read in place
 
 // A tool for developers: giving up loudly is fine.
@@ -79,7 +79,8 @@ fn read(file: &MeshFile) -> Mesh {
     import::import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap().mesh
 }
 
-/// Draws one look of a mesh `rounds` times on each worker, with each number of samples in turns, and prints a line for each.
+/// Draws one look of a mesh `rounds` times on each worker, with each number of samples in turns, and prints a line for
+/// each number.
 fn measure(
     gpu: &Arc<Gpu>,
     (name, mesh): (&str, &Mesh),

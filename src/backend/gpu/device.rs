@@ -202,8 +202,8 @@ impl Gpu {
         self.pictures_drawn_again.load(Ordering::Relaxed)
     }
 
-    /// To be called before such a picture is drawn once more. The room of its lists is freed, so that the picture never
-    /// has both kinds of buffers.
+    /// To be called before such a picture is drawn once more. Frees the room of its lists, so that it does not stay
+    /// beside that of points.
     pub(super) fn picture_overflowed(&self) {
         self.pictures_drawn_again.fetch_add(1, Ordering::Relaxed);
         self.spare_buffers.clear();

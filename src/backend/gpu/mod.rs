@@ -227,7 +227,7 @@ impl GpuRenderer {
         plan: &DrawPlan<'_>,
         deadline: &Deadline,
         is_timed: bool,
-        lists_mixed: bool,
+        has_pixel_lists: bool,
     ) -> Result<Option<(Pixels, DrawTimes)>, DrawError> {
         let row_bytes = u64::from(plan.width_px) * 4;
         let size = row_bytes * u64::from(plan.height_px);
@@ -240,7 +240,7 @@ impl GpuRenderer {
             let device = traits(gpu);
             // Kernels write the bytes to where the CPU reads them, if they can.
             let maps_pictures = gpu.handles.maps_storage && staging.size() <= device.binding_bytes_max;
-            let device = DeviceTraits { maps_pictures, lists_mixed, ..device };
+            let device = DeviceTraits { maps_pictures, has_pixel_lists, ..device };
             let schedule = Schedule::new(plan, &device, Goal::Picture)?;
             gpu.make_pipelines(&schedule.kernels(), pipeline_key(plan))?;
             upload_geometry(gpu, buffers, plan, &schedule)?;
@@ -340,7 +340,7 @@ fn traits(gpu: &Gpu) -> DeviceTraits {
         maps_pictures: false,
         int64_atomics: gpu.int64_atomics,
         loops_are_limited: gpu.is_software(),
-        lists_mixed: true,
+        has_pixel_lists: true,
     }
 }
 

@@ -93,7 +93,7 @@ pub fn sample<const N: usize>(textures: &Textures, used: &TextureUse, taps_max: 
     let texels = &image.texels[..];
     let size = [image.width as f32, image.height as f32];
     let mut at = [[0.0; 2]; N];
-    let mut footprints = [Footprint { taps: 1, lod: 0.0, axis: [0.0; 2], sharpness: 1.0 }; N];
+    let mut footprints = [Footprint { taps: 1, lod: 0.0, axis: [0.0; 2], magnification: 1.0 }; N];
     for l in 0..N {
         let (mut right, mut down) = ([0.0; 2], [0.0; 2]);
         for k in 0..2 {
@@ -123,7 +123,7 @@ struct Footprint {
     /// The footprint's longer axis from end to end, in texture coordinates.
     axis: [f32; 2],
     /// Pixels per texel of the finest level, at least 1: for cut-out textures.
-    sharpness: f32,
+    magnification: f32,
 }
 
 impl Footprint {
@@ -161,12 +161,12 @@ impl Footprint {
         let lod = half_log2(size_square).min(image.levels as f32 - 1.0).max(image.first_level as f32);
         // Over all directions of a border, the mean square of a pixel's extent across it is half of both squares.
         let finest = (1_u32 << image.first_level.min(31)) as f32;
-        let sharpness = if (sampler & samplers::CUT_OUT != 0) & is_measured {
+        let magnification = if (sampler & samplers::CUT_OUT != 0) & is_measured {
             finest * quick_rsqrt((0.5 * (across + along)).max(1e-30))
         } else {
             1.0
         };
-        Self { taps: if is_one { 1 } else { taps }, lod, axis, sharpness: sharpness.max(1.0) }
+        Self { taps: if is_one { 1 } else { taps }, lod, axis, magnification: magnification.max(1.0) }
     }
 }
 
@@ -202,25 +202,25 @@ impl Level {
 
 #[inline(always)]
 fn averaged(texels: &[[u16; 4]], image: &Texture, footprint: Footprint, at: [f32; 2], sampler: u32) -> [f32; 4] {
-    let Footprint { taps, lod, axis, sharpness } = footprint;
+    let Footprint { taps, lod, axis, magnification } = footprint;
     let is_cut_out = sampler & samplers::CUT_OUT != 0;
     if sampler & samplers::NEAREST != 0 {
         let level = (lod + 0.5) as u32;
-        let [r, g, b, alpha] = nearest(texels, Level::of(image, level), at, sampler);
+        let color = nearest(texels, Level::of(image, level), at, sampler);
+        if !is_cut_out {
+            return color;
+        }
+        let [r, g, b, distance] = color;
         // Texels of the finest level are drawn whole or not at all.
-        let is_whole = is_cut_out && level <= image.first_level;
-        return match alpha {
-            distance if is_whole => [r, g, b, if distance >= 0.0 { 1.0 } else { 0.0 }],
-            share if is_cut_out => cut_out([r, g, b, share], 1.0),
-            alpha => [r, g, b, alpha],
-        };
+        let is_whole = level <= image.first_level;
+        return if is_whole { [r, g, b, f32::from(distance >= 0.0)] } else { cut_out(color, 1.0) };
     }
     let share_of_next = lod - (lod as u32) as f32;
     let level = Level::of(image, lod as u32);
     let levels = (level, (share_of_next > 0.0).then(|| (level.next(), share_of_next)));
     if taps < 2 {
         let color = trilinear(texels, levels, at, sampler);
-        return if is_cut_out { cut_out(color, sharpness) } else { color };
+        return if is_cut_out { cut_out(color, magnification) } else { color };
     }
     let share = quick_recip(taps as f32);
     let mut sum = [0.0; 4];
@@ -228,7 +228,7 @@ fn averaged(texels: &[[u16; 4]], image: &Texture, footprint: Footprint, at: [f32
         let along = (tap as f32 + 0.5) * share - 0.5;
         let place = [at[0] + axis[0] * along, at[1] + axis[1] * along];
         let color = trilinear(texels, levels, place, sampler);
-        let color = if is_cut_out { cut_out(color, sharpness) } else { color };
+        let color = if is_cut_out { cut_out(color, magnification) } else { color };
         for k in 0..4 {
             sum[k] += color[k];
         }
@@ -238,8 +238,8 @@ fn averaged(texels: &[[u16; 4]], image: &Texture, footprint: Footprint, at: [f32
 
 /// A colour of a cut-out texture: alpha is the share of the pixel that is drawn.
 #[inline(always)]
-fn cut_out([r, g, b, distance]: [f32; 4], sharpness: f32) -> [f32; 4] {
-    [r, g, b, (distance * sharpness + 0.5).clamp(0.0, 1.0)]
+fn cut_out([r, g, b, distance]: [f32; 4], magnification: f32) -> [f32; 4] {
+    [r, g, b, (distance * magnification + 0.5).clamp(0.0, 1.0)]
 }
 
 /// A place in a level, mixed with the next by its share.

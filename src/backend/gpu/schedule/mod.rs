@@ -350,7 +350,7 @@ impl Schedule {
             }
         }
         self.dispatch(device, Kernel::MixedPixels, pixels.count, pixels)?;
-        if !device.lists_mixed {
+        if !device.has_pixel_lists {
             return self.mixed_points(plan, device, pixels);
         }
         self.triangles(device, pixels, SampleTarget::Lists, Pass::of_visibility(plan))?;

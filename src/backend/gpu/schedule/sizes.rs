@@ -76,7 +76,7 @@ pub struct DeviceTraits {
     pub loops_are_limited: bool,
     /// True if mixed pixels have lists of triangles, for which there may be no room; otherwise what each of their
     /// points sees is kept.
-    pub lists_mixed: bool,
+    pub has_pixel_lists: bool,
 }
 
 /// The size of the largest triangle that a thread may draw by itself, 1/256 px: its edge values fit 32 bits.
@@ -93,7 +93,7 @@ pub struct Banding {
     /// in a band's rows and margins.
     pub beyond: u32,
     /// True if mixed pixels have lists.
-    pub lists_mixed: bool,
+    pub has_pixel_lists: bool,
 }
 
 impl Banding {
@@ -116,8 +116,8 @@ impl Banding {
         let rows = rows_in(BAND_BYTES, u64::from(plan.width_px) * pixel_bytes(plan));
         let rows = rows.min(u64::from(plan.height_px)).max(1);
         let seen = rows_in(SEEN_BYTES, u64::from(plan.width_px + 2 * beyond) * seen_bytes(plan));
-        let lists_mixed = device.lists_mixed;
-        let whole = Self { rows: plan.height_px, margin: margin.min(beyond), beyond, lists_mixed };
+        let has_pixel_lists = device.has_pixel_lists;
+        let whole = Self { rows: plan.height_px, margin: margin.min(beyond), beyond, has_pixel_lists };
         if rows >= u64::from(plan.height_px) && u64::from(whole.seen_rows(plan)) <= seen {
             return Ok(whole);
         }
@@ -126,7 +126,7 @@ impl Banding {
             let why = "the device has no room for what lines so wide look at in a picture so wide";
             return Err(DrawError::BeyondGpu(why.to_owned()));
         }
-        Ok(Self { rows: rows.min(room) as u32, margin, beyond, lists_mixed })
+        Ok(Self { rows: rows.min(room) as u32, margin, beyond, has_pixel_lists })
     }
 
     /// Columns of the visibility buffer.
@@ -172,13 +172,13 @@ impl Banding {
     /// Bytes of what the points of some of them see.
     pub fn points_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
         let slot = POINTS as u64 * SAMPLE_BYTES;
-        if plan.has_mixed() && !self.lists_mixed { u64::from(self.slots(plan)) * slot } else { 0 }
+        if plan.has_mixed() && !self.has_pixel_lists { u64::from(self.slots(plan)) * slot } else { 0 }
     }
 
     /// Items in the lists of mixed pixels that there is room for.
     pub fn list_capacity(&self, plan: &DrawPlan<'_>) -> u32 {
         let wanted = (plan.width_px * self.rows).saturating_mul(ITEMS_PER_PIXEL).clamp(LIST_ITEMS_MIN, LIST_ITEMS_MAX);
-        if plan.has_mixed() && self.lists_mixed { wanted } else { 0 }
+        if plan.has_mixed() && self.has_pixel_lists { wanted } else { 0 }
     }
 
     /// Parts of their colours that there is room for.
@@ -202,7 +202,7 @@ pub fn bands_bytes(plan: &DrawPlan<'_>) -> u64 {
         maps_pictures: false,
         int64_atomics: true,
         loops_are_limited: false,
-        lists_mixed: true,
+        has_pixel_lists: true,
     };
     // Buffers are made a quarter larger than they need to be.
     Banding::new(plan, &device, Goal::Picture)
@@ -283,7 +283,7 @@ mod tests {
                 assert!(banding.seen_samples(plan) * SAMPLE_BYTES <= device.binding_bytes_max);
                 assert!(banding.mixed_bytes(plan) <= device.binding_bytes_max, "{case:?}");
                 assert!(banding.lists_bytes(plan) <= device.binding_bytes_max, "{case:?}");
-                let again = Banding { lists_mixed: false, ..banding };
+                let again = Banding { has_pixel_lists: false, ..banding };
                 assert!(again.points_bytes(plan) <= device.binding_bytes_max, "{case:?}");
                 assert!(again.bytes(plan) <= ALL_BYTES_MAX, "{case:?}");
                 mixed += usize::from(banding.lists_bytes(plan) > 0 && again.points_bytes(plan) > 0);

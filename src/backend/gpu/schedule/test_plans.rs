@@ -14,7 +14,7 @@ pub const DEVICE: DeviceTraits = DeviceTraits {
     maps_pictures: false,
     int64_atomics: false,
     loops_are_limited: true,
-    lists_mixed: true,
+    has_pixel_lists: true,
 };
 
 /// Properties of a test plan.

@@ -153,7 +153,7 @@ mod tests {
             let triangles = vec![[0; 3]; triangles];
             let mut plan = plan(&triangles, case);
             plan.hull = None;
-            let banding = Banding { rows: 256, margin: 0, beyond: 0, lists_mixed: false };
+            let banding = Banding { rows: 256, margin: 0, beyond: 0, has_pixel_lists: false };
             let tiles = Tiles::new(&plan, &software, banding, u64::from(plan.samples));
             let all = PIECES_MAX * triangles.len() as u32;
             let rounds = tiles.rounds(all, all);
