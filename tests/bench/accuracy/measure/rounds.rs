@@ -1,8 +1,10 @@
 //! Draws a scene's cases in rounds, so that whatever slows the machine slows all of them, and
 //! measures their pictures.
 
-use std::rc::Rc;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
 
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
@@ -12,7 +14,7 @@ use meshsnap::spec::{Samples, WireMethod};
 
 use super::scenes::{Scene, plan};
 use super::techniques::{Family, Technique};
-use super::truths::{Apart, Truth};
+use super::truths::{Apart, Errors, Truth};
 use super::{BASELINE_SAMPLES, BackEnd, Effort, Row};
 use crate::oracle::screen::Screen;
 use crate::oracle::surface::srgb;
@@ -54,12 +56,9 @@ pub fn measure(scene: &Scene, effort: Effort, back_ends: &mut [BackEnd]) -> Vec<
     let (drawn, baseline_ms) = rounds(&cases, &baseline, effort.runs, back_ends);
 
     let mut rows = Vec::new();
-    let techniques = scene.family.techniques();
-    for (case, drawn) in cases.iter().zip(&drawn) {
-        let truth =
-            &truths[techniques.iter().position(|&own| own == case.technique).expect("a technique of the family")];
-        for (i, (back_end, on)) in back_ends.iter().zip(drawn).enumerate() {
-            let twin = (i > 0).then(|| Apart::of(&drawn[0].picture, &on.picture));
+    let errors = errors(scene.family.techniques(), &truths, &cases, &drawn);
+    for ((case, drawn), errors) in cases.iter().zip(&drawn).zip(errors) {
+        for ((back_end, on), (errors, twin)) in back_ends.iter().zip(drawn).zip(errors) {
             let is_cpu = back_end.name.starts_with("cpu");
             assert!(!is_cpu || on.picture == drawn[0].picture, "{}: threads change the picture", scene.name);
             let median_ms = median(on.times_ms.clone());
@@ -73,12 +72,33 @@ pub fn measure(scene: &Scene, effort: Effort, back_ends: &mut [BackEnd]) -> Vec<
                 thickness: case.thickness,
                 median_ms,
                 time_ratio: median_ms / baseline_ms,
-                errors: truth.errors(&on.picture),
+                errors,
                 twin: twin.filter(|_| !is_cpu),
             });
         }
     }
     rows
+}
+
+/// The errors of each case's pictures, and how far each is from the first back-end's. Cases are compared side by side,
+/// and equal pictures once.
+fn errors(
+    techniques: &[Technique],
+    truths: &[Arc<Truth>],
+    cases: &[Case<'_>],
+    drawn: &[Vec<Drawn>],
+) -> Vec<Vec<(Errors, Option<Apart>)>> {
+    let compared = |(case, drawn): (&Case<'_>, &Vec<Drawn>)| {
+        let truth = techniques.iter().position(|&own| own == case.technique).expect("a technique of the family");
+        let first = truths[truth].errors(&drawn[0].picture);
+        let others = drawn[1..].iter().map(|on| {
+            let is_equal = on.picture == drawn[0].picture;
+            let errors = if is_equal { first } else { truths[truth].errors(&on.picture) };
+            (errors, Some(Apart::of(&drawn[0].picture, &on.picture)))
+        });
+        std::iter::once((first, None)).chain(others).collect()
+    };
+    cases.par_iter().zip(drawn).map(compared).collect()
 }
 
 /// A GPU that has been idle for as long as the CPU draws all cases takes three to five times as long at first, because
@@ -155,9 +175,9 @@ fn case<'a>(
 }
 
 /// A truth for each technique, in their order.
-fn truths(scene: &Scene, effort: Effort, mesh: &Mesh, baseline: &Case<'_>, cases: &[Case<'_>]) -> Vec<Rc<Truth>> {
+fn truths(scene: &Scene, effort: Effort, mesh: &Mesh, baseline: &Case<'_>, cases: &[Case<'_>]) -> Vec<Arc<Truth>> {
     let of = |technique, plan: &DrawPlan<'_>| {
-        Rc::new(Truth::new(scene.family, technique, plan, scene.width_px, effort.points_per_side))
+        Arc::new(Truth::new(scene.family, technique, plan, scene.width_px, effort.points_per_side))
     };
     let techniques = scene.family.techniques();
     let own = |technique| cases.iter().find(|case| case.technique == technique).expect("a case of each technique");
@@ -165,7 +185,7 @@ fn truths(scene: &Scene, effort: Effort, mesh: &Mesh, baseline: &Case<'_>, cases
         Family::Wires => vec![of(Technique::Wire(WireMethod::Exact), &baseline.plan); techniques.len()],
         Family::Faces | Family::Pictures => vec![of(Technique::FaceNormals, &cases[0].plan); techniques.len()],
         Family::Textures | Family::WholeTextures => vec![of(techniques[0], &cases[0].plan)],
-        Family::Whole => techniques.iter().map(|&technique| of(technique, &own(technique).plan)).collect(),
+        Family::Whole => techniques.par_iter().map(|&technique| of(technique, &own(technique).plan)).collect(),
         // Each in its own view: room is left for what sticks out.
         Family::Outlines => {
             let outline = |&technique: &Technique| {
@@ -174,7 +194,7 @@ fn truths(scene: &Scene, effort: Effort, mesh: &Mesh, baseline: &Case<'_>, cases
                 lines.projection = own.plan.projection;
                 of(technique, &lines)
             };
-            techniques.iter().map(outline).collect()
+            techniques.par_iter().map(outline).collect()
         }
     }
 }
