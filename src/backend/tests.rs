@@ -12,7 +12,7 @@ use wgpu::naga;
 
 use super::cpu::geometry::transform::{GUARD, OUTSIDE, ScreenVertex};
 use super::cpu::geometry::{clip, samples};
-use super::cpu::lines::holes::{self, inset};
+use super::cpu::lines::holes::{self, inset, tips};
 use super::cpu::lines::{coverage, hidden_lines, segment, stroke};
 use super::cpu::mixed::find::breaks;
 use super::cpu::mixed::find::look::{self, kinds};
@@ -95,7 +95,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("IDS_MAX" = line_shares::IDS_MAX, "INTERVALS_MAX" = line_shares::INTERVALS_MAX);
     add!("LINE_THREADS" = line_shares::LINE_THREADS);
     add!("MARKED" = holes::MARKED, "STROKED" = holes::STROKED, "CROSSING_PX" = holes::CROSSING_PX);
-    add!("FACES_MAX" = holes::FACES_MAX, "HOLE_UNIT" = inset::HOLE_UNIT);
+    add!("TIP_SLACK" = tips::TIP_SLACK, "FACES_MAX" = holes::FACES_MAX, "HOLE_UNIT" = inset::HOLE_UNIT);
     add!("INSIDE" = inset::INSIDE, "NARROW_PX" = inset::NARROW_PX, "LEVEL_PX" = inset::LEVEL_PX);
     // Mixed pixels.
     add_same!("", kinds: BY_NORMAL BY_COLOR UNIQUE);
@@ -152,6 +152,9 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
 /// Constants that only shaders have: the states of a search, places in their own buffers, what fits
 /// their 32 bits.
 const SHADER_ONLY: &[&str] = &[
+    "TIP_BEHIND",
+    "TIP_BESIDE",
+    "TIP_WITHIN",
     "NEARER",
     "OTHER",
     "FIND_ALONG",
@@ -190,7 +193,7 @@ fn kernels() -> Vec<Kernel> {
         Kernel::Edge,
         Kernel::Coverage,
     ];
-    all.extend([Kernel::Holes, Kernel::LineLight, Kernel::Resolve, Kernel::Paint]);
+    all.extend([Kernel::Holes, Kernel::Tips, Kernel::LineLight, Kernel::Resolve, Kernel::Paint]);
     all.extend([Kernel::Breaks, Kernel::Thin, Kernel::MixedPixels, Kernel::MixedColor]);
     all.extend([Kernel::MixedParts, Kernel::MixedShade, Kernel::MixedSum]);
     for write in [SampleWrite::Both, SampleWrite::Depth, SampleWrite::Id] {

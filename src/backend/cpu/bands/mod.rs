@@ -191,7 +191,7 @@ fn find_holes(
     holes.reset(samples);
     holes::mark_odd_samples(context.isa, context, samples, holes);
     if context.is_plain {
-        add_holes_plainly(context, pass, samples, holes);
+        add_holes_plainly(context, pass, triangles, samples, holes);
     } else {
         add_holes(context.isa, context, pass, triangles, samples, holes);
     }

@@ -4,10 +4,12 @@
 use super::edge::{LineDrawer, LineTarget, Window};
 use super::hidden_lines::{HiddenIntervals, NEARER_RATIO, hidden_by};
 use super::holes::inset::Insets;
+use super::holes::tips::TipRange;
 use super::holes::{Holes, half_width, looked_at, marks_of_hidden};
 use super::segment::Segment;
 use super::stroke::{self, Mask};
 use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::setups::Corners;
 use crate::backend::cpu::isa::{Isa, LANES};
@@ -80,10 +82,27 @@ pub(super) fn is_behind_all(
 }
 
 /// As [`add_holes`](super::holes::dig::add_holes): each pixel looks for the faces that are seen close by.
-pub fn add_holes_plainly(context: &RasterContext<'_>, pass: &LinePass, band: &SampleBand, holes: &mut Holes) {
+pub fn add_holes_plainly(
+    context: &RasterContext<'_>,
+    pass: &LinePass,
+    (bins, number): (&[TriangleBin], usize),
+    band: &SampleBand,
+    holes: &mut Holes,
+) {
     let plan = context.plan;
     let half = [plan.width_px as i32 * 128, plan.height_px as i32 * 128];
     let reach = pass.hidden_reach_px() as i32;
+    let inset_of = |id: u32| {
+        let insets = Insets::new(&Corners::load(context, &[id; LANES]), half, half_width(pass));
+        (insets.is_open[0] != 0).then(|| insets.get(0, half))
+    };
+    let tips = TipRange::new(plan, pass, band);
+    let surface = |id: &u32| (*id as usize) < plan.triangles.len();
+    for id in bins.iter().flat_map(|chunk| chunk.whole_in(number)).filter(surface) {
+        if inset_of(id).is_some() {
+            tips.mark(context, band, id, holes);
+        }
+    }
     let [columns, rows] = looked_at(band, reach);
     for y in rows[0]..rows[1] {
         for x in columns[0]..columns[1] {
@@ -94,11 +113,7 @@ pub fn add_holes_plainly(context: &RasterContext<'_>, pass: &LinePass, band: &Sa
             ids.dedup();
             ids.retain(|&id| !context.screen_triangle(id).iter().any(|corner| corner.is_outside()));
             for id in ids {
-                let insets = Insets::new(&Corners::load(context, &[id; LANES]), half, half_width(pass));
-                if insets.is_open[0] == 0 {
-                    continue;
-                }
-                let inset = insets.get(0, half);
+                let Some(inset) = inset_of(id) else { continue };
                 holes.mark_around([x, y], reach, marks_of_hidden(context, band, half, (&inset, id), [x, y]));
                 if let Some(at) = holes.index([x, y]) {
                     holes.add(at, inset.areas(Isa::baseline(), x, y)[0]);

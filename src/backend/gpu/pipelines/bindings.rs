@@ -35,6 +35,7 @@ impl Kernel {
             Self::Shade => SHADE,
             Self::Paint => PAINT,
             Self::Holes => HOLES,
+            Self::Tips => TIPS,
             Self::Edge => EDGE,
             Self::Coverage => COVERAGE,
             Self::LineLight => LINE_LIGHT,
@@ -282,6 +283,14 @@ const HOLES: &[Binding] = &[
     (Slot::Vertices, Read),
     (Slot::Samples, Read),
     (Slot::Owners, ReadWrite),
+    (Slot::Strokes, ReadWrite),
+];
+
+const TIPS: &[Binding] = &[
+    (Slot::Triangles, Read),
+    (Slot::PassMasks, Read),
+    (Slot::Vertices, Read),
+    (Slot::Samples, Read),
     (Slot::Strokes, ReadWrite),
 ];
 

@@ -8,11 +8,12 @@ const ONE_JOB: &str = include_str!("../../../../shaders/one_job.wgsl");
 const GANG: &str = include_str!("../../../../shaders/gang.wgsl");
 const CONTOUR: &str = include_str!("../../../../shaders/lines/contour.wgsl");
 const HIDDEN_LINES: &str = include_str!("../../../../shaders/lines/hidden_lines.wgsl");
-const INSET: &str = include_str!("../../../../shaders/lines/inset.wgsl");
+const INSET: &str = include_str!("../../../../shaders/lines/holes/inset.wgsl");
+const MARKS: &str = include_str!("../../../../shaders/lines/holes/marks.wgsl");
 const SEEN: &str = include_str!("../../../../shaders/lines/seen.wgsl");
 const SEGMENT: &str = include_str!("../../../../shaders/lines/segment.wgsl");
 const LATTICE: &str = include_str!("../../../../shaders/lines/lattice.wgsl");
-const FREE_POINTS: &str = include_str!("../../../../shaders/lines/free_points.wgsl");
+const FREE_POINTS: &str = include_str!("../../../../shaders/lines/holes/free_points.wgsl");
 const STROKE_WORDS: &str = include_str!("../../../../shaders/lines/stroke_words.wgsl");
 const STROKE: &str = include_str!("../../../../shaders/lines/stroke.wgsl");
 const PLANES: &str = include_str!("../../../../shaders/geometry/planes.wgsl");
@@ -80,6 +81,7 @@ impl Kernel {
             Self::MixedShade => "mixed_shade",
             Self::MixedSum => "mixed_sum",
             Self::Holes => "holes",
+            Self::Tips => "tips",
             Self::Edge => "edge",
             Self::Coverage => "coverage",
             Self::LineLight => "line_light",
@@ -171,8 +173,12 @@ impl Kernel {
                 [&[TRIANGLE], SHADE, &[include_str!("../../../../shaders/lines/line_light.wgsl")]].concat().concat()
             }
             Self::Holes => {
-                let kernel = include_str!("../../../../shaders/lines/holes.wgsl");
-                [TRIANGLE, STROKE_WORDS, SEEN, INSET, kernel].concat()
+                let kernel = include_str!("../../../../shaders/lines/holes/holes.wgsl");
+                [TRIANGLE, STROKE_WORDS, SEEN, INSET, MARKS, kernel].concat()
+            }
+            Self::Tips => {
+                let kernel = include_str!("../../../../shaders/lines/holes/tips.wgsl");
+                [TRIANGLE, CULLING, STROKE_WORDS, SEEN, INSET, MARKS, kernel].concat()
             }
             Self::Edge => {
                 let kernel = include_str!("../../../../shaders/lines/edge.wgsl");
@@ -255,6 +261,7 @@ impl Kernel {
             Self::LineLight => SHADED,
             Self::Coverage => key::HOLED | key::SURFACE | key::HULL | key::PEELING | key::SAMPLES | key::ADAPTIVE,
             Self::Holes => key::SAMPLES,
+            Self::Tips => key::SAMPLES | key::PASS_MASKS,
             Self::Edge => key::HOLED | key::CONTOURS | key::CLIPPED | key::SAMPLES,
             Self::Resolve => key::SURFACE | key::HULL | key::LINES | key::GANG,
         }

@@ -62,6 +62,8 @@ pub enum Kernel {
     Paint,
     /// Faces to the area that their lines leave free.
     Holes,
+    /// Triangles to the tips of theirs that no sample shows.
+    Tips,
     /// Edges to strokes.
     Edge,
     /// Unites the strokes of a line pass in each pixel and composites them over the colours.
@@ -242,7 +244,7 @@ impl Kernel {
             }
             Self::Grid | Self::Gather => DrawStage::Occlusion,
             Self::Composite | Self::Shade | Self::Paint => DrawStage::Shade,
-            Self::Holes | Self::Edge | Self::Coverage | Self::LineLight => DrawStage::Lines,
+            Self::Holes | Self::Tips | Self::Edge | Self::Coverage | Self::LineLight => DrawStage::Lines,
             Self::Resolve => DrawStage::Resolve,
         }
     }

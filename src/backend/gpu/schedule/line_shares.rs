@@ -1,10 +1,12 @@
 //! Distribution of lines over threads: edges per workgroup, slices per window of an edge, and work
 //! per dispatch.
 
+use super::CHUNK;
 use super::sizes::{DeviceTraits, has_visibility};
 use super::step::Step;
 use crate::backend::DrawError;
-use crate::backend::gpu::params::{Batch, line_flags};
+use crate::backend::gpu::params::{Batch, faces_code, line_flags};
+use crate::backend::gpu::pass_mask::Pass;
 use crate::backend::gpu::pipelines::Kernel;
 use crate::backend::gpu::schedule::Schedule;
 use crate::plan::{DrawPlan, LinePass};
@@ -159,7 +161,7 @@ impl Schedule {
             };
             let has_holes = plan.has_holes_under(lines);
             if has_holes {
-                self.holes(device, (plan.width_px, lines), lined)?;
+                self.holes(plan, device, lines, lined)?;
                 self.edges(device, lines, edges_first, shares, with(lined, line_flags::RIM_PASS))?;
             }
             let flag = if has_holes { line_flags::HOLES } else { 0 };
@@ -173,16 +175,24 @@ impl Schedule {
         Ok(())
     }
 
-    /// The holes of a pass's faces in rows of a band.
+    /// The holes of a pass's faces in rows of a band, and their tips.
     fn holes(
         &mut self,
+        plan: &DrawPlan<'_>,
         device: &DeviceTraits,
-        (width_px, lines): (u32, &LinePass),
+        lines: &LinePass,
         lined: Batch,
     ) -> Result<(), DrawError> {
         let beyond = 2 * lines.hidden_reach_px();
         let rows = lined.row_end.abs_diff(lined.row_first) + beyond;
-        self.dispatch(device, Kernel::Holes, (width_px + beyond) * rows, lined)
+        self.dispatch(device, Kernel::Holes, (plan.width_px + beyond) * rows, lined)?;
+        let Some(Pass { ids, faces, pass_bit, .. }) = Pass::of_visibility(plan)[0].clone() else { return Ok(()) };
+        for first in ids.clone().step_by(CHUNK as usize) {
+            let (count, pass_bit) = (CHUNK.min(ids.end - first), u32::from(pass_bit));
+            let batch = Batch { first, count, faces: faces_code(faces), pass_bit, ..lined };
+            self.dispatch(device, Kernel::Tips, count, batch)?;
+        }
+        Ok(())
     }
 
     /// The edges of a pass, in as many dispatches as that takes.

@@ -1,5 +1,5 @@
 //! Stage lines, per marked pixel: the points that its faces leave free. Twin of
-//! `shaders/lines/free_points.wgsl`.
+//! `shaders/lines/holes/free_points.wgsl`.
 //!
 //! Areas of insets do not tell how much is free where a sheet ends, because some of a face may be
 //! hidden. Points do: each of a pixel's points belongs to a

@@ -1,5 +1,5 @@
 //! Stage lines, per face and pixel: what the lines along all edges of a surface leave free of it.
-//! Twin of `shaders/lines/holes.wgsl`.
+//! Twin of `shaders/lines/holes/holes.wgsl`.
 //!
 //! Lines cover all of a sheet of faces but the faces' [insets](inset), if each side of each face is a
 //! line. Insets do not overlap, so their areas add up. Pixels in which that may not hold are marked.
@@ -22,6 +22,7 @@
 pub(crate) mod dig;
 pub(crate) mod free_points;
 pub(crate) mod inset;
+pub(crate) mod tips;
 
 use self::inset::{HOLE_UNIT, Inset};
 use crate::backend::cpu::RasterContext;

@@ -7,6 +7,7 @@ mod small;
 
 use self::small::{add_areas, masked};
 use super::inset::{Inset, Insets};
+use super::tips::TipRange;
 use super::{Holes, half_width, looked_at, marks_of_hidden};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::BoxedFace;
@@ -45,7 +46,7 @@ fn holes_sampled<const S: usize>(
 ) {
     let mut digger = Digger::<S>::new(context, pass, band);
     let tiles = Tiles::new(band);
-    // A band has more rows than are looked at. What counts in a row shows a sample in it or beside it.
+    // A band has more rows than are looked at. What counts in a row, or has a tip there, has a sample in it or beside it.
     let rows = [digger.looked_at[1][0] - 1, digger.looked_at[1][1] + 1];
     let [first, end] = band.range()[1];
     let rows = [rows[0].max(first), rows[1].min(end)];
@@ -82,7 +83,8 @@ struct Waiting {
 }
 
 impl Waiting {
-    /// Adds those of up to eight faces that touch samples and do not lie behind all tiles there.
+    /// Adds those of up to eight faces that touch samples and do not lie behind all tiles there, or a pixel farther,
+    /// where they may have tips.
     #[inline(always)]
     fn push_seen<const S: usize>(
         &mut self,
@@ -92,9 +94,14 @@ impl Waiting {
         ids: &[u32],
     ) {
         let Boxes { bounds: [columns, rows], depth_max } = boxes::<S>(context, &padded(ids), band);
+        let range = band.range();
         for l in 0..ids.len().min(LANES) {
-            let (columns, rows) = ([columns[0][l], columns[1][l]], [rows[0][l], rows[1][l]]);
-            let is_empty = (columns[0] > columns[1]) | (rows[0] > rows[1]) | (rows[1] < first) | (rows[0] >= end);
+            let is_without = (columns[0][l] > columns[1][l]) | (rows[0][l] > rows[1][l]);
+            let wider = |k: usize, v: &[[i32; LANES]; 2]| {
+                [v[0][l].wrapping_sub(1).max(range[k][0]), v[1][l].wrapping_add(1).min(range[k][1] - 1)]
+            };
+            let (columns, rows) = (wider(0, &columns), wider(1, &rows));
+            let is_empty = is_without | (rows[1] < first) | (rows[0] >= end);
             let is_surface = (ids[l] as usize) < context.plan.triangles.len();
             // Written in any case, kept by the count.
             self.ids[self.len % (2 * LANES)] = ids[l];
@@ -149,6 +156,7 @@ struct Digger<'a, const S: usize> {
     half_width: f32,
     looked_at: [[i32; 2]; 2],
     reach: i32,
+    tips: TipRange,
     /// Places of the samples of eight pixels of a row, 1/256 px from the corner of the first.
     offsets: [[[f32; S]; LANES]; 2],
     /// Pixels looked at since the last poll of the deadline.
@@ -172,6 +180,7 @@ impl<'a, const S: usize> Digger<'a, S> {
             half_width: half_width(pass),
             looked_at: looked_at(band, reach),
             reach,
+            tips: TipRange::new(plan, pass, band),
             offsets: std::array::from_fn(|axis| {
                 std::array::from_fn(|pixel| std::array::from_fn(|s| place(axis, pixel, s)))
             }),
@@ -201,6 +210,7 @@ impl<'a, const S: usize> Digger<'a, S> {
         let insets = Insets::of(self.context, &faces.ids, self.half, self.half_width);
         for (l, &id) in faces.ids.iter().enumerate().take(faces.len) {
             if insets.is_open[l] != 0 {
+                self.tips.mark(self.context, self.band, id, holes);
                 self.dig(&insets.get(l, self.half), id, holes);
             }
         }

@@ -1,5 +1,5 @@
 //! Stage lines, per face: the part of it that its lines leave free. Twin of
-//! `shaders/lines/inset.wgsl`.
+//! `shaders/lines/holes/inset.wgsl`.
 //!
 //! A face's inset is what lies at least half a line's width from its three sides. It is the triangle
 //! scaled about its incentre by `(r - w/2) / r`, r being the radius of the inscribed circle, and is

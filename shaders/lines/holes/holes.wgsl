@@ -145,15 +145,3 @@ fn may_cross(behind: u32, before: u32, at: vec2<i32>, depth: f32) -> bool {
     let slope = rn2(rn2(vec2(far.depth.y - near.depth.y, far.depth.z - near.depth.z) * scale) * (CROSSING_PX * 256.0));
     return rn(gap * gap) <= rn(slope.x * slope.x) + rn(slope.y * slope.y);
 }
-
-// Marks the shown pixels up to so far away.
-fn mark_around(pixel: vec2<i32>, reach: i32, marks: u32) {
-    let low = max(pixel - reach, vec2(0, batch.row_first));
-    let high = min(pixel + reach, vec2(frame.width, batch.row_end) - 1);
-    for (var y = low.y; y <= high.y; y++) {
-        for (var x = low.x; x <= high.x; x++) {
-            let at = u32((y - batch.row_first) * frame.width + x);
-            atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], marks);
-        }
-    }
-}

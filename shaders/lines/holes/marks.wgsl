@@ -1,0 +1,13 @@
+// Stage lines: marks of pixels in which areas do not tell what lines leave free. The kernels declare the buffers.
+
+// Marks the shown pixels up to so far away.
+fn mark_around(pixel: vec2<i32>, reach: i32, marks: u32) {
+    let low = max(pixel - reach, vec2(0, batch.row_first));
+    let high = min(pixel + reach, vec2(frame.width, batch.row_end) - 1);
+    for (var y = low.y; y <= high.y; y++) {
+        for (var x = low.x; x <= high.x; x++) {
+            let at = u32((y - batch.row_first) * frame.width + x);
+            atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], marks);
+        }
+    }
+}

@@ -1,0 +1,146 @@
+// Stage lines, per triangle: corners that poke through what their pixel shows, before any sample shows them. Twin of
+// src/backend/cpu/lines/holes/tips.rs.
+
+@group(1) @binding(2) var<storage, read> triangles: array<u32>;
+@group(1) @binding(3) var<storage, read> vertices: array<Vertex>;
+// Low word: complement of the id. High word: depth.
+@group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
+// Strokes per pixel, as stroke_words.wgsl lays them out.
+@group(1) @binding(12) var<storage, read_write> strokes: array<atomic<u32>>;
+
+// A tip lies before a face if it is nearer than the face would be this far down its slope, 1/256 px.
+const TIP_SLACK: f32 = 2.0;
+
+// Places of a vertex relative to a face.
+// Not before its plane, or not comparable.
+const TIP_BEHIND: u32 = 0u;
+// Before its plane, and on screen not inside the face.
+const TIP_BESIDE: u32 = 1u;
+// Before its plane, and on screen inside the face.
+const TIP_WITHIN: u32 = 2u;
+
+@compute @workgroup_size(WORKGROUP)
+fn tips(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
+    if i >= batch.count {
+        return;
+    }
+    let t = batch.first + i;
+    let corners = array<Vertex, 3>(corner_of(t, 0u), corner_of(t, 1u), corner_of(t, 2u));
+    if corners[0].x == OUTSIDE || corners[1].x == OUTSIDE || corners[2].x == OUTSIDE {
+        return;
+    }
+    let places = array<vec2<i32>, 3>(place_of(corners[0]), place_of(corners[1]), place_of(corners[2]));
+    let area = area_of(corners[0], corners[1], corners[2]);
+    if !passes_culling(t, area)
+        || !inset_of(places[0], places[1], places[2]).is_open {
+        return;
+    }
+    // Pixels beyond the shown ones may mark one of them.
+    let reach = i32(0.5 * batch.line_width) + 1;
+    let first = vec2(-reach, batch.row_first - reach);
+    let end = vec2(frame.width, batch.row_end) + reach;
+    let low = min(min(places[0], places[1]), places[2]);
+    let high = max(max(places[0], places[1]), places[2]);
+    for (var k = 0; k < 3; k++) {
+        let pixel = (places[k] + vec2(frame.width, frame.height) * 128) >> vec2(8u);
+        let is_looked_at = all(pixel >= first) && all(pixel < end) && has_samples(pixel);
+        if is_looked_at && is_tip(t, corners[k], pixel, low, high, is_negative(area)) {
+            mark_around(pixel, reach, MARKED | STROKED);
+        }
+    }
+}
+
+fn corner_of(t: u32, k: u32) -> Vertex {
+    return vertices[triangles[3u * t + k]];
+}
+
+fn place_of(corner: Vertex) -> vec2<i32> {
+    return vec2(corner.x, corner.y);
+}
+
+// True if the corner of a face lies before all faces that its pixel shows, and within one of them. Of faces that turn
+// away, a corner counts only where a column and a row of the pixel's samples cross the face, and where it is before
+// some of these samples, as on the CPU.
+fn is_tip(t: u32, corner: Vertex, pixel: vec2<i32>, low: vec2<i32>, high: vec2<i32>, is_front: bool) -> bool {
+    let first = pixel_corner(pixel);
+    var is_before_some = false;
+    var spans = vec2(is_front);
+    for (var s = 0; s < sample_count(); s++) {
+        let seen = seen_at(pixel, u32(s));
+        if seen.x == t {
+            return false;
+        }
+        is_before_some = is_before_some || bitcast<f32>(seen.y) <= corner.z;
+        let at = first + sample_offset(s);
+        spans = spans | ((at >= low) & (at <= high));
+    }
+    if is_front && !is_before_some {
+        is_before_some = is_before_some_around(corner, pixel);
+    }
+    if !is_before_some || !all(spans) {
+        return false;
+    }
+    var last = NOTHING;
+    var is_within_any = false;
+    for (var s = 0; s < sample_count(); s++) {
+        let seen = seen_at(pixel, u32(s)).x;
+        if seen != last || seen == NOTHING {
+            let where_it_is = place_before(seen, corner);
+            if where_it_is == TIP_BEHIND {
+                return false;
+            }
+            is_within_any = is_within_any || where_it_is == TIP_WITHIN;
+        }
+        last = seen;
+    }
+    return is_within_any;
+}
+
+// True if a vertex is not behind all samples of its pixel and the eight around it.
+fn is_before_some_around(vertex: Vertex, pixel: vec2<i32>) -> bool {
+    for (var n = 0; n < 9 * sample_count(); n++) {
+        let place = n / sample_count();
+        let beside = pixel + vec2(place % 3, place / 3) - 1;
+        if has_samples(beside) && bitcast<f32>(seen_at(beside, u32(n % sample_count())).y) <= vertex.z {
+            return true;
+        }
+    }
+    return false;
+}
+
+// The place of a vertex relative to a face.
+fn place_before(face: u32, vertex: Vertex) -> u32 {
+    if face >= frame.triangle_count {
+        return TIP_BEHIND;
+    }
+    let a = corner_of(face, 0u);
+    let b = corner_of(face, 1u);
+    let c = corner_of(face, 2u);
+    let at = place_of(vertex);
+    if a.x == OUTSIDE || b.x == OUTSIDE || c.x == OUTSIDE
+        || all(place_of(a) == at) || all(place_of(b) == at) || all(place_of(c) == at) {
+        return TIP_BEHIND;
+    }
+    let area = area_of(a, b, c);
+    if is_zero(area) {
+        return TIP_BEHIND;
+    }
+    let setup = setup_of(a, b, c, area);
+    let plane = rn(setup.depth.x + rn(setup.depth.y * f32(vertex.x - setup.x.x)))
+        + rn(setup.depth.z * f32(vertex.y - setup.y.x));
+    if vertex.z <= rn(plane) + rn(TIP_SLACK * (abs(setup.depth.y) + abs(setup.depth.z))) {
+        return TIP_BEHIND;
+    }
+    // On the inner hand of each side.
+    for (var k = 0; k < 3; k++) {
+        let next = (k + 1) % 3;
+        let along = vec2(setup.x[next] - setup.x[k], setup.y[next] - setup.y[k]);
+        let from_start = vec2(vertex.x - setup.x[k], vertex.y - setup.y[k]);
+        let side = sub_wide(mul_wide(along.x, from_start.y), mul_wide(along.y, from_start.x));
+        if is_zero(side) || is_negative(side) {
+            return TIP_BESIDE;
+        }
+    }
+    return TIP_WITHIN;
+}

@@ -1,0 +1,130 @@
+//! Stage lines, per face: corners that poke through what their pixel shows, before any sample shows
+//! them. Twin of `shaders/lines/holes/tips.wgsl`.
+//!
+//! A face without a sample nearby does not count in holes, though its lines may show: a spike that comes
+//! half a pixel out of a wall. The pixels around such a tip get the strokes of all edges.
+
+use super::{Holes, MARKED, STROKED, looked_at};
+use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::geometry::samples::SampleBand;
+use crate::backend::cpu::geometry::transform::ScreenVertex;
+use crate::backend::cpu::geometry::visibility::{Setup, area};
+use crate::plan::{DrawPlan, LinePass, sample_offsets};
+
+/// A tip lies before a face if it is nearer than the face would be this far down its slope, 1/256 px. Corners are
+/// rounded to 1, so that what stands on a face may seem to lie before it by as much.
+pub const TIP_SLACK: f32 = 2.0;
+
+/// Columns and rows of pixels in which tips are looked for, and how far around them pixels are marked.
+pub(in crate::backend::cpu::lines) struct TipRange {
+    half: [i32; 2],
+    looked_at: [[i32; 2]; 2],
+    reach: i32,
+}
+
+impl TipRange {
+    /// Those of a band.
+    pub fn new(plan: &DrawPlan<'_>, pass: &LinePass, band: &SampleBand) -> Self {
+        let reach = pass.hidden_reach_px() as i32;
+        let half = [plan.width_px, plan.height_px].map(|size| size as i32 * 128);
+        Self { half, looked_at: looked_at(band, reach), reach }
+    }
+
+    /// Gives strokes to the pixels around a face's tips.
+    #[inline(always)]
+    pub fn mark(&self, context: &RasterContext<'_>, band: &SampleBand, id: u32, holes: &mut Holes) {
+        let corners = context.screen_triangle(id);
+        let is_front = area(&corners) < 0;
+        for corner in &corners {
+            let [x, y] = [corner.x + self.half[0], corner.y + self.half[1]].map(|v| v >> 8);
+            let [columns, rows] = self.looked_at;
+            if x < columns[0] || x >= columns[1] || y < rows[0] || y >= rows[1] {
+                continue;
+            }
+            let (ids, depths) = band.pixel(x, y);
+            // Most corners are seen, or hidden by all that is seen.
+            let mut is_own = false;
+            let mut is_before_some = false;
+            for (&other, &depth) in ids.iter().zip(depths) {
+                is_own |= other == id;
+                is_before_some |= depth <= corner.z;
+            }
+            if is_own || !(is_before_some || is_front && is_before_some_around(band, corner, [x, y])) {
+                continue;
+            }
+            if self.is_tip(context, ids, (&corners, corner), [x, y], is_front) {
+                holes.mark_around([x, y], self.reach, MARKED | STROKED);
+            }
+        }
+    }
+
+    /// True if the corner of a face lies before all faces that its pixel shows, and within one of them. Of faces that
+    /// turn away, a corner counts only where a column and a row of the pixel's samples cross the face, and where it is
+    /// before some of these samples: others may not be listed.
+    #[inline(never)]
+    fn is_tip(
+        &self,
+        context: &RasterContext<'_>,
+        ids: &[u32],
+        (corners, corner): (&[ScreenVertex; 3], &ScreenVertex),
+        [x, y]: [i32; 2],
+        is_front: bool,
+    ) -> bool {
+        let first = [x * 256 - self.half[0], y * 256 - self.half[1]];
+        let spans_sample = |axis: usize| {
+            let of = |v: &ScreenVertex| [v.x, v.y][axis];
+            let (low, high) =
+                corners.iter().fold((i32::MAX, i32::MIN), |(low, high), v| (low.min(of(v)), high.max(of(v))));
+            sample_offsets(ids.len() as u32).iter().any(|at| (low..=high).contains(&(first[axis] + at[axis])))
+        };
+        let mut is_within_any = false;
+        for &other in ids {
+            match place(context, other, corner) {
+                Place::Behind => return false,
+                Place::Beside => {}
+                Place::Within => is_within_any = true,
+            }
+        }
+        is_within_any && (is_front || (spans_sample(0) && spans_sample(1)))
+    }
+}
+
+/// True if a vertex is not behind all samples of its pixel and the eight around it.
+fn is_before_some_around(band: &SampleBand, vertex: &ScreenVertex, [x, y]: [i32; 2]) -> bool {
+    let around = (-1..=1).flat_map(|down| (-1..=1).map(move |right| [x + right, y + down]));
+    around.filter(|&[x, y]| band.has(x, y)).any(|[x, y]| band.pixel(x, y).1.iter().any(|&depth| depth <= vertex.z))
+}
+
+/// The place of a vertex relative to a face.
+#[derive(PartialEq)]
+enum Place {
+    /// Not before its plane, or not comparable.
+    Behind,
+    /// Before its plane, and on screen not inside the face.
+    Beside,
+    /// Before its plane, and on screen inside the face.
+    Within,
+}
+
+fn place(context: &RasterContext<'_>, face: u32, vertex: &ScreenVertex) -> Place {
+    if face as usize >= context.plan.triangles.len() {
+        return Place::Behind;
+    }
+    let corners = context.screen_triangle(face);
+    if corners.iter().any(|corner| corner.is_outside() || [corner.x, corner.y] == [vertex.x, vertex.y]) {
+        return Place::Behind;
+    }
+    let Some(setup) = Setup::new(&corners) else { return Place::Behind };
+    let [z, right, down] = setup.depth;
+    let plane = (z + right * (vertex.x - setup.x[0]) as f32) + down * (vertex.y - setup.y[0]) as f32;
+    if vertex.z <= plane + TIP_SLACK * (right.abs() + down.abs()) {
+        return Place::Behind;
+    }
+    let is_inside = (0..3).all(|k| {
+        let next = (k + 1) % 3;
+        let d = |a: i32, b: i32| i64::from(a) - i64::from(b);
+        let along = [d(setup.x[next], setup.x[k]), d(setup.y[next], setup.y[k])];
+        along[0] * d(vertex.y, setup.y[k]) - along[1] * d(vertex.x, setup.x[k]) > 0
+    });
+    if is_inside { Place::Within } else { Place::Beside }
+}
