@@ -18,6 +18,8 @@ const SAMPLER_NEAREST: u32 = 16u;
 const SAMPLER_SECOND_UVS: u32 = 32u;
 // In place of alpha, texels say how much of a pixel is drawn.
 const SAMPLER_CUT_OUT: u32 = 64u;
+// One place of each pixel alone, in the level of its footprint's longer side.
+const SAMPLER_TRILINEAR: u32 = 128u;
 
 // Largest coordinate: beyond it f32 has too few fractional bits.
 const UV_MAX: f32 = 1048576.0;
@@ -133,7 +135,7 @@ fn footprint_of(image: Image, sampler: u32, taps_max: u32, right: vec2<f32>, dow
     }
     let one = Footprint(1u, lod_of(image, max(across, along)), vec2(0.0), magnification);
     let is_small = across + along < 2.25;
-    if (sampler & SAMPLER_NEAREST) != 0u || is_small || !is_measured {
+    if (sampler & (SAMPLER_NEAREST | SAMPLER_TRILINEAR)) != 0u || is_small || !is_measured {
         return one;
     }
     let diagonal = rn2(right * right) + rn2(down * down);

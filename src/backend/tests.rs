@@ -68,6 +68,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("WRAP_BITS" = samplers::WRAP_BITS, "WRAP_DOWN_SHIFT" = samplers::DOWN_SHIFT);
     add!("WRAP_REPEAT" = samplers::REPEAT, "WRAP_MIRROR" = samplers::MIRROR, "SAMPLER_NEAREST" = samplers::NEAREST);
     add!("SAMPLER_SECOND_UVS" = samplers::SECOND_UVS, "SAMPLER_CUT_OUT" = samplers::CUT_OUT);
+    add!("SAMPLER_TRILINEAR" = samplers::TRILINEAR);
     // Values that mean something else than a number.
     add!(
         "OUTSIDE" = OUTSIDE,

@@ -85,8 +85,10 @@ fn outlines_faces_and_textures_are_measured_too() {
             }
             Family::Textures => {
                 let [error, pixels] = [rmse(Technique::Texture), at(Technique::Texture).pixels as f64];
-                println!("textures: {error} of {pixels} pixels");
+                let trilinear = rmse(Technique::Trilinear);
+                println!("textures: {error} of {pixels} pixels, trilinear {trilinear}");
                 assert!(error < 6.0 && pixels > 5000.0, "{error} of {pixels} pixels");
+                assert!(3.0 * error < trilinear, "{error}, trilinear {trilinear}");
             }
             Family::Whole => {
                 for &technique in scene.family.techniques() {

@@ -138,7 +138,7 @@ impl Footprint {
         let is_small = across + along < 2.25;
         // Infinite sums and NaN are not.
         let is_measured = across + along < 1e12;
-        let is_one = (sampler & samplers::NEAREST != 0) | is_small | !is_measured;
+        let is_one = (sampler & (samplers::NEAREST | samplers::TRILINEAR) != 0) | is_small | !is_measured;
         let [a, c] = [0, 1].map(|k| right[k] * right[k] + down[k] * down[k]);
         let b = right[0] * right[1] + down[0] * down[1];
         let half = 0.5 * (a - c);

@@ -254,6 +254,7 @@ fn words(technique: Technique) -> &'static str {
         Technique::FaceNormals => "face normals",
         Technique::DerivativeNormals => "derivative normals",
         Technique::Texture => "textures",
+        Technique::Trilinear => "textures, trilinear",
         other => other.name(),
     }
 }
@@ -267,6 +268,7 @@ fn color(technique: Technique) -> &'static str {
         Technique::Hull => "#d9730d",
         Technique::FaceNormals => "#2da15f",
         Technique::DerivativeNormals => "#c545a8",
+        Technique::Trilinear => "#768390",
         Technique::Texture | Technique::TexturedFaces => "#a8800c",
         Technique::LitFaces | Technique::WiredFaces => "#2f81f7",
         Technique::SmoothFaces | Technique::OutlinedFaces => "#d9730d",

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
-use meshsnap::plan::DrawPlan;
+use meshsnap::plan::{DrawPlan, samplers};
 use meshsnap::spec::{Samples, WireMethod};
 
 use super::scenes::{Scene, plan};
@@ -171,7 +171,12 @@ fn case<'a>(
     let thickness = f64::from(thickness as f32);
     let (scale, asked) = if samples == DOUBLED { (2, Samples::Fixed(16)) } else { (1, samples) };
     let keys = technique.keys(scene, asked, f64::from(scale) * thickness);
-    Case { technique, samples, thickness, plan: plan(mesh, &scene.spec(scale * effort.size_px, &keys)) }
+    let mut plan = plan(mesh, &scene.spec(scale * effort.size_px, &keys));
+    if technique == Technique::Trilinear {
+        let materials = plan.surface.iter_mut().flat_map(|surface| &mut surface.materials);
+        materials.flat_map(|material| &mut material.textures).for_each(|used| used.sampler |= samplers::TRILINEAR);
+    }
+    Case { technique, samples, thickness, plan }
 }
 
 /// A truth for each technique, in their order.
@@ -184,7 +189,7 @@ fn truths(scene: &Scene, effort: Effort, mesh: &Mesh, baseline: &Case<'_>, cases
     match scene.family {
         Family::Wires => vec![of(Technique::Wire(WireMethod::Exact), &baseline.plan); techniques.len()],
         Family::Faces | Family::Pictures => vec![of(Technique::FaceNormals, &cases[0].plan); techniques.len()],
-        Family::Textures | Family::WholeTextures => vec![of(techniques[0], &cases[0].plan)],
+        Family::Textures | Family::WholeTextures => vec![of(techniques[0], &cases[0].plan); techniques.len()],
         Family::Whole => techniques.par_iter().map(|&technique| of(technique, &own(technique).plan)).collect(),
         // Each in its own view: room is left for what sticks out.
         Family::Outlines => {

@@ -47,6 +47,8 @@ pub enum Technique {
     FaceNormals,
     DerivativeNormals,
     Texture,
+    /// Textures at one place of each pixel.
+    Trilinear,
     /// Faces lit by their own normals.
     LitFaces,
     /// Faces lit by normals between corners.
@@ -60,8 +62,8 @@ pub enum Technique {
 }
 
 use Technique::{
-    Contour, DerivativeNormals, FaceNormals, Hull, LitFaces, OutlinedFaces, SmoothFaces, Texture, TexturedFaces, Wire,
-    WiredFaces,
+    Contour, DerivativeNormals, FaceNormals, Hull, LitFaces, OutlinedFaces, SmoothFaces, Texture, TexturedFaces,
+    Trilinear, Wire, WiredFaces,
 };
 
 /// Whole pictures, but for how normals are found.
@@ -81,7 +83,7 @@ impl Family {
             Self::Wires => &WIRES,
             Self::Outlines => &[Contour, Hull],
             Self::Faces | Self::Pictures => &[FaceNormals, DerivativeNormals],
-            Self::Textures => &[Texture],
+            Self::Textures => &[Texture, Trilinear],
             Self::Whole => &[LitFaces, SmoothFaces, WiredFaces, OutlinedFaces],
             Self::WholeTextures => &[TexturedFaces],
         }
@@ -109,7 +111,7 @@ impl Family {
 }
 
 impl Technique {
-    /// As requests name it; `texture` is the one way of filtering.
+    /// As requests name it. `texture` is how pictures are filtered, and no request asks for `trilinear`.
     pub fn name(self) -> &'static str {
         match self {
             Wire(method) => method.info().name,
@@ -118,6 +120,7 @@ impl Technique {
             FaceNormals => "face",
             DerivativeNormals => "derivative",
             Texture => "texture",
+            Trilinear => "trilinear",
             LitFaces => "lit faces",
             SmoothFaces => "smooth faces",
             WiredFaces => "wires over faces",
@@ -131,7 +134,7 @@ impl Technique {
     pub fn thickness(self, width_px: f64, height_px: f64) -> f64 {
         let unit = if let Wire(method) = self { method.info().unit } else { ThicknessUnit::Pixels };
         match (self, unit) {
-            (FaceNormals | DerivativeNormals | Texture | LitFaces | SmoothFaces | TexturedFaces, _) => 0.0,
+            (FaceNormals | DerivativeNormals | Texture | Trilinear | LitFaces | SmoothFaces | TexturedFaces, _) => 0.0,
             (_, ThicknessUnit::Pixels) => width_px,
             (_, ThicknessUnit::Derivatives) => 0.5 * (width_px - width_px.min(1.0)),
             // Both triangles of an edge draw the wire.
@@ -160,7 +163,7 @@ impl Technique {
                 ("surface.color", "c08040"),
                 ("background", "fff"),
             ],
-            Texture | TexturedFaces => vec![("style", "unlit"), ("background", "fff")],
+            Texture | Trilinear | TexturedFaces => vec![("style", "unlit"), ("background", "fff")],
             LitFaces | WiredFaces | OutlinedFaces => [&[("style", "flat")], LIT].concat(),
             SmoothFaces => [&[("style", "smooth")], LIT].concat(),
         };
@@ -197,7 +200,7 @@ impl Technique {
             }
             Contour | Hull | OutlinedFaces => keys.push(("outline.thickness", thickness.to_string())),
             WiredFaces => keys.push(("wire.thickness", thickness.to_string())),
-            FaceNormals | DerivativeNormals | Texture | LitFaces | SmoothFaces | TexturedFaces => {}
+            FaceNormals | DerivativeNormals | Texture | Trilinear | LitFaces | SmoothFaces | TexturedFaces => {}
         }
         keys.push(("samples", samples.to_string()));
         keys
