@@ -1,4 +1,4 @@
-// Stage shade, per point: texture lookups. Twin of src/backend/cpu/surface/texture.rs: the same
+// Stage shade, per point: texture lookups. Twin of src/backend/cpu/surface/texture/mod.rs: the same
 // bits, because texels decide what a mask leaves and where nearest texels change.
 
 @group(1) @binding(18) var<storage, read> uvs: array<vec2<f32>>;

@@ -294,7 +294,7 @@ impl Points<'_> {
                 } else {
                     Uv::new(&uv_corners(self.surface, uvs, used, &place.ids), &place.b)
                 };
-                *texels = sample(textures, used, samplers::taps_max(slot), &uv);
+                *texels = sample(self.context.isa, textures, used, samplers::taps_max(slot), &uv);
             }
         }
         texels

@@ -3,8 +3,12 @@
 //! The same bits on both back-ends, because texels decide what a mask leaves and where nearest
 //! texels change.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+
 use super::barycentric::Barycentrics;
 use crate::backend::cpu::geometry::transform::{quick_recip, quick_rsqrt};
+use crate::backend::cpu::isa::Isa;
 use crate::plan::{CornerValues, SurfacePass, Texture, TextureUse, Textures, samplers};
 
 /// Largest coordinate: beyond it f32 has too few fractional bits.
@@ -85,7 +89,13 @@ pub fn blend<const K: usize, const N: usize>([p, q, r]: &[[[f32; N]; K]; 3], w: 
 /// Linear RGBA of a texture: the mean of places along the pixel's footprint, each trilinear; white where there is
 /// no texture ([`TEXTURE_NONE`](crate::plan::TEXTURE_NONE)). Up to `taps_max` places are looked at.
 #[inline(always)]
-pub fn sample<const N: usize>(textures: &Textures, used: &TextureUse, taps_max: u32, uv: &Uv<N>) -> [[f32; N]; 4] {
+pub fn sample<const N: usize>(
+    isa: Isa,
+    textures: &Textures,
+    used: &TextureUse,
+    taps_max: u32,
+    uv: &Uv<N>,
+) -> [[f32; N]; 4] {
     let mut out = [[1.0; N]; 4];
     let Some(image) = textures.images.get(used.texture as usize) else {
         return out;
@@ -105,7 +115,7 @@ pub fn sample<const N: usize>(textures: &Textures, used: &TextureUse, taps_max: 
         footprints[l] = Footprint::of(image, used.sampler, taps_max, right, down);
     }
     for l in 0..N {
-        let texel = averaged(texels, image, footprints[l], at[l], used.sampler);
+        let texel = averaged(isa, texels, image, footprints[l], at[l], used.sampler);
         for k in 0..4 {
             out[k][l] = texel[k];
         }
@@ -201,7 +211,15 @@ impl Level {
 }
 
 #[inline(always)]
-fn averaged(texels: &[[u16; 4]], image: &Texture, footprint: Footprint, at: [f32; 2], sampler: u32) -> [f32; 4] {
+#[allow(unsafe_code)]
+fn averaged(
+    isa: Isa,
+    texels: &[[u16; 4]],
+    image: &Texture,
+    footprint: Footprint,
+    at: [f32; 2],
+    sampler: u32,
+) -> [f32; 4] {
     let Footprint { taps, lod, axis, magnification } = footprint;
     let is_cut_out = sampler & samplers::CUT_OUT != 0;
     if sampler & samplers::NEAREST != 0 {
@@ -219,16 +237,32 @@ fn averaged(texels: &[[u16; 4]], image: &Texture, footprint: Footprint, at: [f32
     let level = Level::of(image, lod as u32);
     let levels = (level, (share_of_next > 0.0).then(|| (level.next(), share_of_next)));
     if taps < 2 {
-        let color = trilinear(texels, levels, at, sampler);
+        let color = trilinear(isa, texels, levels, at, sampler);
         return if is_cut_out { cut_out(color, magnification) } else { color };
     }
+    #[cfg(target_arch = "x86_64")]
+    if isa.has_avx2() && !is_cut_out {
+        // SAFETY: the processor has AVX2, as `isa` says.
+        return unsafe { avx2::mean(texels, levels, (at, axis), taps, sampler) };
+    }
+    mean_plainly((at, axis), taps, |place| {
+        let color = trilinear(isa, texels, levels, place, sampler);
+        if is_cut_out { cut_out(color, magnification) } else { color }
+    })
+}
+
+/// The mean of the colours at places along an axis, side by side around a place.
+#[inline(always)]
+fn mean_plainly(
+    (at, axis): ([f32; 2], [f32; 2]),
+    taps: u32,
+    mut color_at: impl FnMut([f32; 2]) -> [f32; 4],
+) -> [f32; 4] {
     let share = quick_recip(taps as f32);
     let mut sum = [0.0; 4];
     for tap in 0..taps {
         let along = (tap as f32 + 0.5) * share - 0.5;
-        let place = [at[0] + axis[0] * along, at[1] + axis[1] * along];
-        let color = trilinear(texels, levels, place, sampler);
-        let color = if is_cut_out { cut_out(color, magnification) } else { color };
+        let color = color_at([at[0] + axis[0] * along, at[1] + axis[1] * along]);
         for k in 0..4 {
             sum[k] += color[k];
         }
@@ -244,7 +278,25 @@ fn cut_out([r, g, b, distance]: [f32; 4], magnification: f32) -> [f32; 4] {
 
 /// A place in a level, mixed with the next by its share.
 #[inline(always)]
+#[allow(unsafe_code)]
 fn trilinear(
+    isa: Isa,
+    texels: &[[u16; 4]],
+    levels: (Level, Option<(Level, f32)>),
+    at: [f32; 2],
+    sampler: u32,
+) -> [f32; 4] {
+    #[cfg(target_arch = "x86_64")]
+    if isa.has_avx2() {
+        // SAFETY: the processor has AVX2, as `isa` says.
+        return unsafe { avx2::trilinear(texels, levels, at, sampler) };
+    }
+    let _ = isa;
+    trilinear_plainly(texels, levels, at, sampler)
+}
+
+#[inline(always)]
+fn trilinear_plainly(
     texels: &[[u16; 4]],
     (level, next): (Level, Option<(Level, f32)>),
     at: [f32; 2],
@@ -357,6 +409,48 @@ mod tests {
             assert_eq!(half_to_f32(half), want);
             assert_eq!(half_to_f32(half | 0x8000), -want);
         }
+    }
+
+    #[test]
+    #[allow(unsafe_code)]
+    fn each_instruction_set_finds_the_same_colors() {
+        let mut state = 7_u32;
+        let mut random = || {
+            // xorshift32
+            state ^= state << 13;
+            state ^= state >> 17;
+            state ^= state << 5;
+            state
+        };
+        // Finite halves; the second level lies behind the first, and a third one beyond the end.
+        let texels: Vec<[u16; 4]> =
+            (0..12 * 7 + 6 * 3).map(|_| [0; 4].map(|_: u16| random() as u16 & 0xFBFF)).collect();
+        let levels = [(0, [12, 7]), (84, [6, 3]), (102, [3, 1])].map(|(first, size)| Level { first, size });
+        let mut mixed = 0;
+        for case in 0..20_000 {
+            let [u, v] =
+                [0; 2].map(|_| (random() as i32 as f32 * 2.0_f32.powi(-30 + case % 22)).clamp(-UV_MAX, UV_MAX));
+            let at = [[u, v], [0.0, -0.0], [1.0, v], [u, -1.0]][if case % 9 < 3 { case as usize % 9 + 1 } else { 0 }];
+            let sampler = (random() % 3) | ((random() % 3) << samplers::DOWN_SHIFT);
+            let share = random() as f32 * 2.0_f32.powi(-32);
+            let first = random() as usize % 2;
+            let pair = (levels[first], (case % 5 > 0).then(|| (levels[first + 1], share)));
+            let want = trilinear_plainly(&texels, pair, at, sampler);
+            mixed += usize::from(want[0] != want[1]);
+            #[cfg(target_arch = "x86_64")]
+            if Isa::detect().has_avx2() {
+                let (axis, taps) = ([0.3 * v, share], 2 + case as u32 % 7);
+                let want = mean_plainly((at, axis), taps, |at| trilinear_plainly(&texels, pair, at, sampler));
+                // SAFETY: the processor has AVX2, as was asked.
+                let got = unsafe { avx2::mean(&texels, pair, (at, axis), taps, sampler) };
+                assert_eq!(got.map(f32::to_bits), want.map(f32::to_bits), "{at:?}, {axis:?}, {taps}, {sampler}");
+            }
+            for isa in Isa::available() {
+                let got = trilinear(isa, &texels, pair, at, sampler);
+                assert_eq!(got.map(f32::to_bits), want.map(f32::to_bits), "{isa:?}, {at:?}, {sampler}");
+            }
+        }
+        assert!(mixed > 15_000, "{mixed}");
     }
 
     #[test]
