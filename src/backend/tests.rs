@@ -155,7 +155,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
 const SHADER_ONLY: &[&str] = &[
     "TIP_BEHIND",
     "TIP_BESIDE",
-    "TIP_WITHIN",
+    "TIP_INSIDE",
     "NEARER",
     "OTHER",
     "FIND_ALONG",

@@ -1,6 +1,6 @@
 // Stage lines: marks of pixels in which areas do not tell what lines leave free. The kernels declare the buffers.
 
-// Marks the shown pixels up to so far away.
+// Marks the shown pixels up to `reach` columns and rows from one.
 fn mark_around(pixel: vec2<i32>, reach: i32, marks: u32) {
     let low = max(pixel - reach, vec2(0, batch.row_first));
     let high = min(pixel + reach, vec2(frame.width, batch.row_end) - 1);

@@ -1,5 +1,5 @@
-// Stage lines, per triangle: corners that poke through what their pixel shows, before any sample shows them. Twin of
-// src/backend/cpu/lines/holes/tips.rs.
+// Stage lines, per triangle: its tips, which are corners in front of all that their pixel shows, of which no sample of
+// the pixel shows the triangle. Twin of src/backend/cpu/lines/holes/tips.rs.
 
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
 @group(1) @binding(3) var<storage, read> vertices: array<Vertex>;
@@ -8,16 +8,17 @@
 // Strokes per pixel, as stroke_words.wgsl lays them out.
 @group(1) @binding(12) var<storage, read_write> strokes: array<atomic<u32>>;
 
-// A tip lies before a face if it is nearer than the face would be this far down its slope, 1/256 px.
+// A corner is in front of a face if it is nearer than the face's plane is anywhere up to this far away, across and down,
+// 1/256 px.
 const TIP_SLACK: f32 = 2.0;
 
-// Places of a vertex relative to a face.
-// Not before its plane, or not comparable.
+// A vertex's relation to a face.
+// Not in front of its plane, or not comparable.
 const TIP_BEHIND: u32 = 0u;
-// Before its plane, and on screen not inside the face.
+// In front of its plane, and on screen not inside the face.
 const TIP_BESIDE: u32 = 1u;
-// Before its plane, and on screen inside the face.
-const TIP_WITHIN: u32 = 2u;
+// In front of its plane, and on screen inside the face.
+const TIP_INSIDE: u32 = 2u;
 
 @compute @workgroup_size(WORKGROUP)
 fn tips(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -59,9 +60,8 @@ fn place_of(corner: Vertex) -> vec2<i32> {
     return vec2(corner.x, corner.y);
 }
 
-// True if the corner of a face lies before all faces that its pixel shows, and within one of them. Of faces that turn
-// away, a corner counts only where a column and a row of the pixel's samples cross the face, and where it is before
-// some of these samples, as on the CPU.
+// True if the corner of a face is in front of all faces that its pixel shows, and on screen inside one of them. Of a face
+// that turns away, only where a column and a row of the pixel's samples cross the face, as on the CPU.
 fn is_tip(t: u32, corner: Vertex, pixel: vec2<i32>, low: vec2<i32>, high: vec2<i32>, is_front: bool) -> bool {
     let first = pixel_corner(pixel);
     var is_before_some = false;
@@ -82,19 +82,19 @@ fn is_tip(t: u32, corner: Vertex, pixel: vec2<i32>, low: vec2<i32>, high: vec2<i
         return false;
     }
     var last = NOTHING;
-    var is_within_any = false;
+    var is_inside_any = false;
     for (var s = 0; s < sample_count(); s++) {
         let seen = seen_at(pixel, u32(s)).x;
         if seen != last || seen == NOTHING {
-            let where_it_is = place_before(seen, corner);
-            if where_it_is == TIP_BEHIND {
+            let relation = relation_to(seen, corner);
+            if relation == TIP_BEHIND {
                 return false;
             }
-            is_within_any = is_within_any || where_it_is == TIP_WITHIN;
+            is_inside_any = is_inside_any || relation == TIP_INSIDE;
         }
         last = seen;
     }
-    return is_within_any;
+    return is_inside_any;
 }
 
 // True if a vertex is not behind all samples of its pixel and the eight around it.
@@ -109,8 +109,8 @@ fn is_before_some_around(vertex: Vertex, pixel: vec2<i32>) -> bool {
     return false;
 }
 
-// The place of a vertex relative to a face.
-fn place_before(face: u32, vertex: Vertex) -> u32 {
+// A vertex's relation to a face.
+fn relation_to(face: u32, vertex: Vertex) -> u32 {
     if face >= frame.triangle_count {
         return TIP_BEHIND;
     }
@@ -142,5 +142,5 @@ fn place_before(face: u32, vertex: Vertex) -> u32 {
             return TIP_BESIDE;
         }
     }
-    return TIP_WITHIN;
+    return TIP_INSIDE;
 }

@@ -146,8 +146,8 @@ pub mod samplers {
     pub const SECOND_UVS: u32 = 32;
     /// In place of alpha, texels say how much of a pixel is drawn: see [`mips`](crate::texture::mips::fill).
     pub const CUT_OUT: u32 = 64;
-    /// One place of each pixel alone, in the level of its footprint's longer side: trilinear filtering, to compare with. No
-    /// request asks for it.
+    /// Plain trilinear filtering: one lookup per pixel, in the level of its longer step. For the benchmark; no request
+    /// asks for it.
     pub const TRILINEAR: u32 = 128;
     /// Places along the longer axis of a pixel's footprint that are looked at, at most.
     pub const TAPS_MAX: u32 = 8;

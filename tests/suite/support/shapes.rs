@@ -183,8 +183,8 @@ impl Random {
 }
 
 /// What makes lines hard: an open sheet, an edge of three faces, faces that touch, seams with
-/// T-junctions, silhouettes.
-pub fn hard_for_lines() -> [(&'static str, String); 7] {
+/// T-junctions, silhouettes, tips that come out of a face.
+pub fn hard_for_lines() -> [(&'static str, String); 8] {
     let mut ball = Obj::default();
     ball.ball([0.0; 3], 1.0, 40);
     [
@@ -195,5 +195,25 @@ pub fn hard_for_lines() -> [(&'static str, String); 7] {
         ("room", room_with_t_junctions()),
         ("gear", gear(12)),
         ("ball", ball.finish()),
+        ("bumps", bumps(false)),
     ]
+}
+
+/// A wall of large faces, and flat pyramids behind it whose tips come out of it, most of them without a sample. All sides
+/// of a pyramid face the viewer, or turn away, so that none of its visible edges is a rim.
+pub fn bumps(turn_away: bool) -> String {
+    let mut shape = Obj::default();
+    shape.cuboid([-1.0, -1.0, -1.0], [1.0, 1.0, 0.0]);
+    for i in 0..16 {
+        let n = f64::from(i);
+        let [x, y] = [0.48 * f64::from(i % 4) - 0.723, 0.48 * f64::from(i / 4) - 0.717];
+        let around = |k: u32| (25.0 * n + 120.0 * f64::from(k)).to_radians().sin_cos();
+        let base = [0, 1, 2].map(around).map(|(sin, cos)| shape.vertex([x + 0.23 * cos, y + 0.23 * sin, -0.03]));
+        let tip = shape.vertex([x, y, 0.0005 + 0.0001 * n]);
+        for k in 0..3 {
+            let [a, b] = if turn_away { [(k + 1) % 3, k] } else { [k, (k + 1) % 3] };
+            shape.face(&[base[a], base[b], tip]);
+        }
+    }
+    shape.finish()
 }

@@ -62,7 +62,7 @@ pub enum Kernel {
     Paint,
     /// Faces to the area that their lines leave free.
     Holes,
-    /// Triangles to the tips of theirs that no sample shows.
+    /// Triangles to the pixels around their tips.
     Tips,
     /// Edges to strokes.
     Edge,

@@ -258,7 +258,7 @@ pub fn sentences(rows: &[Row]) -> [String; 6] {
         ),
         format!(
             "Textures err by {:.2}/255 where a pixel shows one face alone, against the mean of the texture over the pixel: {:.2} of what \
-             trilinear filtering errs by, in {:.2} times its time.",
+             trilinear filtering errs by, in {:.2} times the time of that.",
             error(Family::Textures, Technique::Texture),
             error(Family::Textures, Technique::Texture) / error(Family::Textures, Technique::Trilinear),
             time(Family::Textures, Technique::Texture) / time(Family::Textures, Technique::Trilinear),

@@ -84,7 +84,7 @@ fn schema() -> Value {
                             alone; pictures, whole pictures, whole textured pictures: of encoded colour in all pixels; textures: of encoded colour where a pixel \
                             shows one face alone",
         "scenes[].triangles": "after triangulation",
-        "rows[].technique": "wire.method, outline.method or surface.normals of the request; texture: filtering, without light; of whole pictures: what \
+        "rows[].technique": "wire.method, outline.method or surface.normals of the request; texture: filtering, without light; trilinear: the same by one place of each pixel; of whole pictures: what \
                              is drawn",
         "rows[].backend": "cpu-N with N threads, or gpu",
         "rows[].samples": "image.samples; 64: 16 in a picture of twice the columns and rows, scaled down, which is not timed",

@@ -47,7 +47,7 @@ pub enum Technique {
     FaceNormals,
     DerivativeNormals,
     Texture,
-    /// Textures at one place of each pixel.
+    /// Textures by one trilinear lookup per pixel. No request asks for it.
     Trilinear,
     /// Faces lit by their own normals.
     LitFaces,
@@ -111,7 +111,7 @@ impl Family {
 }
 
 impl Technique {
-    /// As requests name it. `texture` is how pictures are filtered, and no request asks for `trilinear`.
+    /// Its name in docs/accuracy.json: that of the request, where it has one.
     pub fn name(self) -> &'static str {
         match self {
             Wire(method) => method.info().name,

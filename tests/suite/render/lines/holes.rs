@@ -39,8 +39,7 @@ const LOOKS: &[Keys<'_>] = &[
 
 /// Sheets, what touches or passes through itself, borders, and an edge of three faces.
 fn meshes() -> Vec<(&'static str, Mesh)> {
-    let own =
-        [("balls that pass through each other", balls_through_each_other()), ("hairs", hairs()), ("bumps", bumps())];
+    let own = [("balls that pass through each other", balls_through_each_other()), ("hairs", hairs())];
     let all = shapes::hard_for_lines().into_iter().chain(own);
     all.map(|(name, obj)| (name, scenes::mesh(&obj))).collect()
 }
@@ -60,22 +59,6 @@ fn hairs() -> String {
         let at = f64::from(i) * 0.2 - 0.7;
         let corners = [[at, -0.8, 0.3], [at + 1e-5, -0.8, 0.3], [at + 0.1, 0.8, 0.35]].map(|p| shape.vertex(p));
         shape.face(&corners);
-    }
-    shape.finish()
-}
-
-/// A wall of large faces, and flat pyramids behind it whose tips come out of it, most of them without a sample. All of a
-/// pyramid's sides face the viewer, so that none of its visible edges is a rim.
-fn bumps() -> String {
-    let mut shape = shapes::Obj::default();
-    shape.cuboid([-1.0, -1.0, -1.0], [1.0, 1.0, 0.0]);
-    for i in 0..16 {
-        let n = f64::from(i);
-        let [x, y] = [0.48 * f64::from(i % 4) - 0.723, 0.48 * f64::from(i / 4) - 0.717];
-        let around = |k: u32| (25.0 * n + 120.0 * f64::from(k)).to_radians().sin_cos();
-        let base = [0, 1, 2].map(around).map(|(sin, cos)| shape.vertex([x + 0.23 * cos, y + 0.23 * sin, -0.03]));
-        let tip = shape.vertex([x, y, 0.0005 + 0.0001 * n]);
-        (0..3).for_each(|k| shape.face(&[base[k], base[(k + 1) % 3], tip]));
     }
     shape.finish()
 }
@@ -101,7 +84,8 @@ fn holes_and_strokes_tell_of_the_same_lines() {
                 let [by_holes, by_strokes] = both(renderer.as_mut(), &mut plan);
                 let likeness = Likeness::of(&by_holes, &by_strokes);
                 // Where strokes overlap, their union is an estimate: that is what holes are for.
-                // With one sample, what comes out of a wall may end half a pixel early.
+                // The visible part of a line that comes out of a wall may end early: by an eighth of a pixel, by a fourth with
+                // one sample.
                 let max = if *name == "bumps" { 64 } else { 32 };
                 likeness.assert(Tolerance { max, share: 0.15 }, &format!("{name}, look {i}, {:?}", renderer.kind()));
                 different += usize::from(likeness.differing() > 0);

@@ -16,7 +16,8 @@ type Keys<'k> = &'k [(&'k str, &'k str)];
 fn meshes() -> Vec<(&'static str, Mesh)> {
     let mut fine = shapes::Obj::default();
     fine.ball([0.0; 3], 1.0, 160);
-    let own = [("two balls", shapes::two_balls()), ("fine ball", fine.finish())];
+    let turned = ("bumps that turn away", shapes::bumps(true));
+    let own = [("two balls", shapes::two_balls()), ("fine ball", fine.finish()), turned];
     let all = shapes::hard_for_lines().into_iter().chain(own);
     all.map(|(name, obj)| (name, scenes::mesh(&obj))).collect()
 }
@@ -65,6 +66,6 @@ fn the_shortcuts_of_lines_change_no_byte() {
             compare(&format!("{name}, look {i}"), mesh, &scenes::spec(keys));
         }
     }
-    assert_eq!(cases, SCENES.len() + 9 * LOOKS.len());
-    assert!(with_lines > 9 * LOOKS.len(), "{with_lines} pictures have lines that something may hide");
+    assert_eq!(cases, SCENES.len() + 11 * LOOKS.len());
+    assert!(with_lines > 11 * LOOKS.len(), "{with_lines} pictures have lines that something may hide");
 }

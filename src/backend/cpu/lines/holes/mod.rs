@@ -13,6 +13,7 @@
 //! In the others the strokes of all edges are drawn:
 //!
 //! - a sample shows a hull, or one close by shows a face that is clipped;
+//! - a [tip](tips) is close by;
 //! - a face that is seen close by is hidden in part by another that it passes through nearby.
 //!
 //! A face counts in a pixel if it shows a sample there or in one of the eight pixels around. What is

@@ -1,8 +1,8 @@
-//! Stage lines, per face: corners that poke through what their pixel shows, before any sample shows
-//! them. Twin of `shaders/lines/holes/tips.wgsl`.
+//! Stage lines, per face: its tips, which are corners in front of all that their pixel shows, of which no
+//! sample of the pixel shows the face. Twin of `shaders/lines/holes/tips.wgsl`.
 //!
 //! A face without a sample nearby does not count in holes, though its lines may show: a spike that comes
-//! half a pixel out of a wall. The pixels around such a tip get the strokes of all edges.
+//! half a pixel out of a wall. The pixels around a tip get the strokes of all edges.
 
 use super::{Holes, MARKED, STROKED, looked_at};
 use crate::backend::cpu::RasterContext;
@@ -11,8 +11,8 @@ use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility::{Setup, area};
 use crate::plan::{DrawPlan, LinePass, sample_offsets};
 
-/// A tip lies before a face if it is nearer than the face would be this far down its slope, 1/256 px. Corners are
-/// rounded to 1, so that what stands on a face may seem to lie before it by as much.
+/// A corner is in front of a face if it is nearer than the face's plane is anywhere up to this far away, across and
+/// down, 1/256 px. Corners are rounded to 1, so that what stands on a face may seem to be in front by as much.
 pub const TIP_SLACK: f32 = 2.0;
 
 /// Columns and rows of pixels in which tips are looked for, and how far around them pixels are marked.
@@ -30,7 +30,7 @@ impl TipRange {
         Self { half, looked_at: looked_at(band, reach), reach }
     }
 
-    /// Gives strokes to the pixels around a face's tips.
+    /// Marks the pixels around a face's tips: they get strokes.
     #[inline(always)]
     pub fn mark(&self, context: &RasterContext<'_>, band: &SampleBand, id: u32, holes: &mut Holes) {
         let corners = context.screen_triangle(id);
@@ -42,7 +42,8 @@ impl TipRange {
                 continue;
             }
             let (ids, depths) = band.pixel(x, y);
-            // Most corners are seen, or hidden by all that is seen.
+            // Most corners are seen, or hidden by all that is seen. Of faces that turn away, those that are behind all
+            // samples of their pixel may not be listed.
             let mut is_own = false;
             let mut is_before_some = false;
             for (&other, &depth) in ids.iter().zip(depths) {
@@ -58,9 +59,9 @@ impl TipRange {
         }
     }
 
-    /// True if the corner of a face lies before all faces that its pixel shows, and within one of them. Of faces that
-    /// turn away, a corner counts only where a column and a row of the pixel's samples cross the face, and where it is
-    /// before some of these samples: others may not be listed.
+    /// True if the corner of a face is in front of all faces that its pixel shows, and on screen inside one of them. Of
+    /// a face that turns away, only where a column and a row of the pixel's samples cross the face: elsewhere a band's
+    /// list may lack it.
     #[inline(never)]
     fn is_tip(
         &self,
@@ -77,15 +78,15 @@ impl TipRange {
                 corners.iter().fold((i32::MAX, i32::MIN), |(low, high), v| (low.min(of(v)), high.max(of(v))));
             sample_offsets(ids.len() as u32).iter().any(|at| (low..=high).contains(&(first[axis] + at[axis])))
         };
-        let mut is_within_any = false;
+        let mut is_inside_any = false;
         for &other in ids {
-            match place(context, other, corner) {
-                Place::Behind => return false,
-                Place::Beside => {}
-                Place::Within => is_within_any = true,
+            match relation_to(context, other, corner) {
+                Relation::Behind => return false,
+                Relation::Beside => {}
+                Relation::Inside => is_inside_any = true,
             }
         }
-        is_within_any && (is_front || (spans_sample(0) && spans_sample(1)))
+        is_inside_any && (is_front || (spans_sample(0) && spans_sample(1)))
     }
 }
 
@@ -95,30 +96,29 @@ fn is_before_some_around(band: &SampleBand, vertex: &ScreenVertex, [x, y]: [i32;
     around.filter(|&[x, y]| band.has(x, y)).any(|[x, y]| band.pixel(x, y).1.iter().any(|&depth| depth <= vertex.z))
 }
 
-/// The place of a vertex relative to a face.
-#[derive(PartialEq)]
-enum Place {
-    /// Not before its plane, or not comparable.
+/// A vertex's relation to a face.
+enum Relation {
+    /// Not in front of its plane, or not comparable.
     Behind,
-    /// Before its plane, and on screen not inside the face.
+    /// In front of its plane, and on screen not inside the face.
     Beside,
-    /// Before its plane, and on screen inside the face.
-    Within,
+    /// In front of its plane, and on screen inside the face.
+    Inside,
 }
 
-fn place(context: &RasterContext<'_>, face: u32, vertex: &ScreenVertex) -> Place {
+fn relation_to(context: &RasterContext<'_>, face: u32, vertex: &ScreenVertex) -> Relation {
     if face as usize >= context.plan.triangles.len() {
-        return Place::Behind;
+        return Relation::Behind;
     }
     let corners = context.screen_triangle(face);
     if corners.iter().any(|corner| corner.is_outside() || [corner.x, corner.y] == [vertex.x, vertex.y]) {
-        return Place::Behind;
+        return Relation::Behind;
     }
-    let Some(setup) = Setup::new(&corners) else { return Place::Behind };
+    let Some(setup) = Setup::new(&corners) else { return Relation::Behind };
     let [z, right, down] = setup.depth;
     let plane = (z + right * (vertex.x - setup.x[0]) as f32) + down * (vertex.y - setup.y[0]) as f32;
     if vertex.z <= plane + TIP_SLACK * (right.abs() + down.abs()) {
-        return Place::Behind;
+        return Relation::Behind;
     }
     let is_inside = (0..3).all(|k| {
         let next = (k + 1) % 3;
@@ -126,5 +126,5 @@ fn place(context: &RasterContext<'_>, face: u32, vertex: &ScreenVertex) -> Place
         let along = [d(setup.x[next], setup.x[k]), d(setup.y[next], setup.y[k])];
         along[0] * d(vertex.y, setup.y[k]) - along[1] * d(vertex.x, setup.x[k]) > 0
     });
-    if is_inside { Place::Within } else { Place::Beside }
+    if is_inside { Relation::Inside } else { Relation::Beside }
 }

@@ -1,5 +1,8 @@
-//! Stage shade, per place of a texture: two levels side by side in AVX2 instructions, and the four components of texels.
-//! The same bits as [`trilinear_plainly`](super::trilinear_plainly). Compilers make branches and single components of it.
+//! Stage shade, per place of a texture: texture lookups in AVX2 instructions. A vector holds the coordinates in both levels,
+//! another the four components of a texel.
+//!
+//! The same bits as [`trilinear_plainly`](super::trilinear_plainly), of which compilers
+//! make branches and single components.
 
 #![allow(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! Stage lines, per face: its hole in the pixels around it, eight pixels of a row at a time. As the
+//! Stage lines, per face: its hole in the pixels around it, eight pixels of a row at a time, and its tips. As the
 //! pixels of [`add_holes_plainly`](crate::backend::cpu::lines::plain::add_holes_plainly) find them.
 
 #[cfg(target_arch = "x86_64")]
@@ -46,7 +46,7 @@ fn holes_sampled<const S: usize>(
 ) {
     let mut digger = Digger::<S>::new(context, pass, band);
     let tiles = Tiles::new(band);
-    // A band has more rows than are looked at. What counts in a row, or has a tip there, has a sample in it or beside it.
+    // A band has more rows than are looked at. What counts in a row shows a sample in it or beside it.
     let rows = [digger.looked_at[1][0] - 1, digger.looked_at[1][1] + 1];
     let [first, end] = band.range()[1];
     let rows = [rows[0].max(first), rows[1].min(end)];
@@ -73,6 +73,9 @@ fn holes_sampled<const S: usize>(
     }
 }
 
+/// By so much more than a face's samples span its tips are compared with samples, pixels.
+const TIPS_PX: i32 = 2;
+
 /// Eight samples: their places, across and down, and their ids.
 type Samples<'s> = (&'s [f32; LANES], &'s [f32; LANES], &'s [u32; LANES]);
 
@@ -83,8 +86,8 @@ struct Waiting {
 }
 
 impl Waiting {
-    /// Adds those of up to eight faces that touch samples and do not lie behind all tiles there, or a pixel farther,
-    /// where they may have tips.
+    /// Adds those of up to eight faces that touch samples and do not lie behind all tiles there. Their tips lie up to a
+    /// pixel beyond these samples, and are compared with samples a pixel farther.
     #[inline(always)]
     fn push_seen<const S: usize>(
         &mut self,
@@ -98,7 +101,7 @@ impl Waiting {
         for l in 0..ids.len().min(LANES) {
             let is_without = (columns[0][l] > columns[1][l]) | (rows[0][l] > rows[1][l]);
             let wider = |k: usize, v: &[[i32; LANES]; 2]| {
-                [v[0][l].wrapping_sub(1).max(range[k][0]), v[1][l].wrapping_add(1).min(range[k][1] - 1)]
+                [v[0][l].wrapping_sub(TIPS_PX).max(range[k][0]), v[1][l].wrapping_add(TIPS_PX).min(range[k][1] - 1)]
             };
             let (columns, rows) = (wider(0, &columns), wider(1, &rows));
             let is_empty = is_without | (rows[1] < first) | (rows[0] >= end);
