@@ -13,7 +13,7 @@ use wgpu::naga;
 use super::cpu::geometry::transform::{GUARD, OUTSIDE, ScreenVertex};
 use super::cpu::geometry::{clip, samples};
 use super::cpu::lines::holes::{self, inset, tips};
-use super::cpu::lines::{coverage, hidden_lines, segment, stroke};
+use super::cpu::lines::{coverage, hidden_lines, profile, segment, stroke};
 use super::cpu::mixed::find::breaks;
 use super::cpu::mixed::find::look::{self, kinds};
 use super::cpu::mixed::find::thin;
@@ -95,6 +95,8 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("INTERVAL_MIN_PX" = hidden_lines::INTERVAL_MIN_PX, "GAP_MIN_PX" = hidden_lines::GAP_MIN_PX);
     add!("IDS_MAX" = line_shares::IDS_MAX, "INTERVALS_MAX" = line_shares::INTERVALS_MAX);
     add!("LINE_THREADS" = line_shares::LINE_THREADS);
+    add!("GAUSS_PLACE" = profile::GAUSS_PLACE, "GAUSS_OUTER" = profile::GAUSS_OUTER);
+    add!("GAUSS_MIDDLE" = profile::GAUSS_MIDDLE);
     add!("MARKED" = holes::MARKED, "STROKED" = holes::STROKED, "CROSSING_PX" = holes::CROSSING_PX);
     add!("TIP_SLACK" = tips::TIP_SLACK, "FACES_MAX" = holes::FACES_MAX, "HOLE_UNIT" = inset::HOLE_UNIT);
     add!("INSIDE" = inset::INSIDE, "NARROW_PX" = inset::NARROW_PX, "LEVEL_PX" = inset::LEVEL_PX);
