@@ -41,12 +41,10 @@ fn tips(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) 
     let reach = i32(0.5 * batch.line_width) + 1;
     let first = vec2(-reach, batch.row_first - reach);
     let end = vec2(frame.width, batch.row_end) + reach;
-    let low = min(min(places[0], places[1]), places[2]);
-    let high = max(max(places[0], places[1]), places[2]);
     for (var k = 0; k < 3; k++) {
         let pixel = (places[k] + vec2(frame.width, frame.height) * 128) >> vec2(8u);
         let is_looked_at = all(pixel >= first) && all(pixel < end) && has_samples(pixel);
-        if is_looked_at && is_tip(t, corners[k], pixel, low, high, is_negative(area)) {
+        if is_looked_at && is_tip(t, corners[k], pixel) {
             mark_around(pixel, reach, MARKED | STROKED);
         }
     }
@@ -60,25 +58,14 @@ fn place_of(corner: Vertex) -> vec2<i32> {
     return vec2(corner.x, corner.y);
 }
 
-// True if the corner of a face is in front of all faces that its pixel shows, and on screen inside one of them. Of a face
-// that turns away, only where a column and a row of the pixel's samples cross the face, as on the CPU.
-fn is_tip(t: u32, corner: Vertex, pixel: vec2<i32>, low: vec2<i32>, high: vec2<i32>, is_front: bool) -> bool {
-    let first = pixel_corner(pixel);
-    var is_before_some = false;
-    var spans = vec2(is_front);
+// True if the corner of a face is in front of all faces that its pixel shows, and on screen inside one of them.
+fn is_tip(t: u32, corner: Vertex, pixel: vec2<i32>) -> bool {
     for (var s = 0; s < sample_count(); s++) {
-        let seen = seen_at(pixel, u32(s));
-        if seen.x == t {
+        if seen_at(pixel, u32(s)).x == t {
             return false;
         }
-        is_before_some = is_before_some || bitcast<f32>(seen.y) <= corner.z;
-        let at = first + sample_offset(s);
-        spans = spans | ((at >= low) & (at <= high));
     }
-    if is_front && !is_before_some {
-        is_before_some = is_before_some_around(corner, pixel);
-    }
-    if !is_before_some || !all(spans) {
+    if !is_before_some_around(corner, pixel) {
         return false;
     }
     var last = NOTHING;

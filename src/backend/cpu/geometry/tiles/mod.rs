@@ -28,6 +28,12 @@ impl Tiles {
     /// The tiles of a band, from the depths that it has now.
     #[inline(always)]
     pub fn new(band: &SampleBand) -> Self {
+        Self::with_border(band, 0)
+    }
+
+    /// As [`new`](Self::new), each tile with so many pixels around it.
+    #[inline(always)]
+    pub fn with_border(band: &SampleBand, border_px: usize) -> Self {
         let [columns, rows] = band.range();
         let count = |[from, to]: [i32; 2]| from.abs_diff(to).div_ceil(TILE as u32) as usize;
         let mut tiles = Self {
@@ -35,12 +41,20 @@ impl Tiles {
             first: [columns[0], rows[0]],
             depth_min: vec![f32::INFINITY; count(columns) * count(rows)],
         };
-        let samples = TILE * band.samples as usize;
+        let samples = band.samples as usize;
+        let tile_rows = count(rows);
+        let mut of_row = vec![f32::INFINITY; tiles.columns];
         for (y, row) in band.depth.chunks_exact(band.stride).take(band.rows as usize).enumerate() {
-            let mins = &mut tiles.depth_min[y / TILE * tiles.columns..][..tiles.columns];
             // What lies beyond the last pixel may have any depth. It can only make the last tile farther.
-            for (min, depths) in mins.iter_mut().zip(row.chunks(samples)) {
-                *min = min.min(smallest(depths));
+            for (i, min) in of_row.iter_mut().enumerate() {
+                let [from, to] = [(i * TILE).saturating_sub(border_px), (i + 1) * TILE + border_px];
+                *min = smallest(&row[from * samples..(to * samples).min(row.len())]);
+            }
+            let [first, last] = [y.saturating_sub(border_px) / TILE, ((y + border_px) / TILE).min(tile_rows - 1)];
+            for mins in tiles.depth_min.chunks_exact_mut(tiles.columns).take(last + 1).skip(first) {
+                for (min, of_row) in mins.iter_mut().zip(&of_row) {
+                    *min = min.min(*of_row);
+                }
             }
         }
         tiles

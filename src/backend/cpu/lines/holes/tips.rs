@@ -8,8 +8,8 @@ use super::{Holes, MARKED, STROKED, looked_at};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
-use crate::backend::cpu::geometry::visibility::{Setup, area};
-use crate::plan::{DrawPlan, LinePass, sample_offsets};
+use crate::backend::cpu::geometry::visibility::Setup;
+use crate::plan::{DrawPlan, LinePass};
 
 /// A corner is in front of a face if it is nearer than the face's plane is anywhere up to this far away, across and
 /// down, 1/256 px. Corners are rounded to 1, so that what stands on a face may seem to be in front by as much.
@@ -34,7 +34,6 @@ impl TipRange {
     #[inline(always)]
     pub fn mark(&self, context: &RasterContext<'_>, band: &SampleBand, id: u32, holes: &mut Holes) {
         let corners = context.screen_triangle(id);
-        let is_front = area(&corners) < 0;
         for corner in &corners {
             let [x, y] = [corner.x + self.half[0], corner.y + self.half[1]].map(|v| v >> 8);
             let [columns, rows] = self.looked_at;
@@ -42,52 +41,35 @@ impl TipRange {
                 continue;
             }
             let (ids, depths) = band.pixel(x, y);
-            // Most corners are seen, or hidden by all that is seen. Of faces that turn away, those that are behind all
-            // samples of their pixel may not be listed.
+            // Most corners are seen, or hidden by all that is seen.
             let mut is_own = false;
             let mut is_before_some = false;
             for (&other, &depth) in ids.iter().zip(depths) {
                 is_own |= other == id;
                 is_before_some |= depth <= corner.z;
             }
-            if is_own || !(is_before_some || is_front && is_before_some_around(band, corner, [x, y])) {
+            if is_own || !(is_before_some || is_before_some_around(band, corner, [x, y])) {
                 continue;
             }
-            if self.is_tip(context, ids, (&corners, corner), [x, y], is_front) {
+            if is_tip(context, ids, corner) {
                 holes.mark_around([x, y], self.reach, MARKED | STROKED);
             }
         }
     }
+}
 
-    /// True if the corner of a face is in front of all faces that its pixel shows, and on screen inside one of them. Of
-    /// a face that turns away, only where a column and a row of the pixel's samples cross the face: elsewhere a band's
-    /// list may lack it.
-    #[inline(never)]
-    fn is_tip(
-        &self,
-        context: &RasterContext<'_>,
-        ids: &[u32],
-        (corners, corner): (&[ScreenVertex; 3], &ScreenVertex),
-        [x, y]: [i32; 2],
-        is_front: bool,
-    ) -> bool {
-        let first = [x * 256 - self.half[0], y * 256 - self.half[1]];
-        let spans_sample = |axis: usize| {
-            let of = |v: &ScreenVertex| [v.x, v.y][axis];
-            let (low, high) =
-                corners.iter().fold((i32::MAX, i32::MIN), |(low, high), v| (low.min(of(v)), high.max(of(v))));
-            sample_offsets(ids.len() as u32).iter().any(|at| (low..=high).contains(&(first[axis] + at[axis])))
-        };
-        let mut is_inside_any = false;
-        for &other in ids {
-            match relation_to(context, other, corner) {
-                Relation::Behind => return false,
-                Relation::Beside => {}
-                Relation::Inside => is_inside_any = true,
-            }
+/// True if a corner is in front of all faces that its pixel shows, and on screen inside one of them.
+#[inline(never)]
+fn is_tip(context: &RasterContext<'_>, ids: &[u32], corner: &ScreenVertex) -> bool {
+    let mut is_inside_any = false;
+    for &other in ids {
+        match relation_to(context, other, corner) {
+            Relation::Behind => return false,
+            Relation::Beside => {}
+            Relation::Inside => is_inside_any = true,
         }
-        is_inside_any && (is_front || (spans_sample(0) && spans_sample(1)))
     }
+    is_inside_any
 }
 
 /// True if a vertex is not behind all samples of its pixel and the eight around it.

@@ -45,7 +45,7 @@ fn holes_sampled<const S: usize>(
     holes: &mut Holes,
 ) {
     let mut digger = Digger::<S>::new(context, pass, band);
-    let tiles = Tiles::new(band);
+    let tiles = Tiles::with_border(band, TIPS_PX);
     // A band has more rows than are looked at. What counts in a row shows a sample in it or beside it.
     let rows = [digger.looked_at[1][0] - 1, digger.looked_at[1][1] + 1];
     let [first, end] = band.range()[1];
@@ -73,8 +73,8 @@ fn holes_sampled<const S: usize>(
     }
 }
 
-/// By so much more than a face's samples span its tips are compared with samples, pixels.
-const TIPS_PX: i32 = 2;
+/// A face's tips lie up to a pixel beyond its samples, and are compared with samples a pixel farther.
+const TIPS_PX: usize = 2;
 
 /// Eight samples: their places, across and down, and their ids.
 type Samples<'s> = (&'s [f32; LANES], &'s [f32; LANES], &'s [u32; LANES]);
@@ -86,8 +86,7 @@ struct Waiting {
 }
 
 impl Waiting {
-    /// Adds those of up to eight faces that touch samples and do not lie behind all tiles there. Their tips lie up to a
-    /// pixel beyond these samples, and are compared with samples a pixel farther.
+    /// Adds those of up to eight faces that touch samples and do not lie behind all tiles there.
     #[inline(always)]
     fn push_seen<const S: usize>(
         &mut self,
@@ -97,14 +96,9 @@ impl Waiting {
         ids: &[u32],
     ) {
         let Boxes { bounds: [columns, rows], depth_max } = boxes::<S>(context, &padded(ids), band);
-        let range = band.range();
         for l in 0..ids.len().min(LANES) {
-            let is_without = (columns[0][l] > columns[1][l]) | (rows[0][l] > rows[1][l]);
-            let wider = |k: usize, v: &[[i32; LANES]; 2]| {
-                [v[0][l].wrapping_sub(TIPS_PX).max(range[k][0]), v[1][l].wrapping_add(TIPS_PX).min(range[k][1] - 1)]
-            };
-            let (columns, rows) = (wider(0, &columns), wider(1, &rows));
-            let is_empty = is_without | (rows[1] < first) | (rows[0] >= end);
+            let (columns, rows) = ([columns[0][l], columns[1][l]], [rows[0][l], rows[1][l]]);
+            let is_empty = (columns[0] > columns[1]) | (rows[0] > rows[1]) | (rows[1] < first) | (rows[0] >= end);
             let is_surface = (ids[l] as usize) < context.plan.triangles.len();
             // Written in any case, kept by the count.
             self.ids[self.len % (2 * LANES)] = ids[l];
