@@ -33,8 +33,7 @@ fn tips(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) 
     }
     let places = array<vec2<i32>, 3>(place_of(corners[0]), place_of(corners[1]), place_of(corners[2]));
     let area = area_of(corners[0], corners[1], corners[2]);
-    if !passes_culling(t, area)
-        || !inset_of(places[0], places[1], places[2]).is_open {
+    if !passes_culling(t, area) || !inset_of(places[0], places[1], places[2]).is_open {
         return;
     }
     // Pixels beyond the shown ones may mark one of them.

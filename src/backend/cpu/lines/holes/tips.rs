@@ -40,18 +40,9 @@ impl TipRange {
             if x < columns[0] || x >= columns[1] || y < rows[0] || y >= rows[1] {
                 continue;
             }
-            let (ids, depths) = band.pixel(x, y);
+            let ids = band.pixel(x, y).0;
             // Most corners are seen, or hidden by all that is seen.
-            let mut is_own = false;
-            let mut is_before_some = false;
-            for (&other, &depth) in ids.iter().zip(depths) {
-                is_own |= other == id;
-                is_before_some |= depth <= corner.z;
-            }
-            if is_own || !(is_before_some || is_before_some_around(band, corner, [x, y])) {
-                continue;
-            }
-            if is_tip(context, ids, corner) {
+            if !ids.contains(&id) && is_before_some_around(band, corner, [x, y]) && is_tip(context, ids, corner) {
                 holes.mark_around([x, y], self.reach, MARKED | STROKED);
             }
         }
