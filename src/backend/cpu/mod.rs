@@ -341,7 +341,9 @@ impl RasterContext<'_> {
     /// The vertices of an id on screen.
     #[inline(always)]
     fn screen_triangle(&self, id: u32) -> [ScreenVertex; 3] {
-        self.triangle(id).map(|v| self.vertices[v as usize])
+        // Not in a closure, which would be compiled for the baseline.
+        let [a, b, c] = self.triangle(id);
+        [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
     }
 }
 

@@ -86,7 +86,7 @@ pub fn unit_or<const N: usize>(v: &[[f32; N]; 3], otherwise: &[[f32; N]; 3]) -> 
 /// bits.
 #[inline(always)]
 pub fn turned_to_viewer(n: [f32; 3], front: bool) -> [f32; 3] {
-    if front { n } else { n.map(|v| -v) }
+    if front { n } else { [-n[0], -n[1], -n[2]] }
 }
 
 /// The unit normals on the viewer's side of interpolated corner normals.

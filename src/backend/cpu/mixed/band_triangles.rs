@@ -1,8 +1,11 @@
 //! Stage mixed, per band: the triangles that its pixels are offered, in the order in which they are.
 
+use std::borrow::Cow;
 use std::ops::ControlFlow;
 
+use super::points::POINT_GRID;
 use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::bands::lists::{BandLists, BoxedFace, pair};
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 
@@ -15,7 +18,7 @@ pub struct BandTriangles<'a> {
     pieces_before: Vec<u32>,
 }
 
-/// Highest bit of a [`ScreenTriangle::item`]: the others are the number of a piece. Ids are smaller.
+/// Highest bit of an item that is the number of a clipped piece among those of the picture; other items are ids.
 const PIECE: u32 = 1 << 31;
 
 /// A triangle, or a piece of one, on screen.
@@ -23,19 +26,8 @@ const PIECE: u32 = 1 << 31;
 pub struct ScreenTriangle {
     /// The triangle.
     pub id: u32,
-    /// Its number among those of the picture, for [`BandTriangles::get`].
-    pub item: u32,
     /// Its corners.
     pub corners: [ScreenVertex; 3],
-}
-
-/// The kinds of a bin's triangles, in the order in which they are offered: what faces away is mostly hidden by then.
-#[derive(Clone, Copy)]
-enum Kind {
-    Pieces,
-    Fronts,
-    Backs,
-    Thin,
 }
 
 impl<'a> BandTriangles<'a> {
@@ -50,45 +42,56 @@ impl<'a> BandTriangles<'a> {
     }
 
     /// Calls `each` for each triangle until it breaks off.
-    #[inline(always)]
-    pub fn for_each(&self, each: impl FnMut(ScreenTriangle) -> ControlFlow<()>) -> ControlFlow<()> {
-        self.for_each_of(&[Kind::Pieces, Kind::Fronts, Kind::Backs], each)
+    pub fn for_each(&self, mut each: impl FnMut(ScreenTriangle) -> ControlFlow<()>) -> ControlFlow<()> {
+        self.boxed().iter().flat_map(|list| list.iter()).try_for_each(|face| each(self.get(face.id)))
     }
 
-    /// The same of those that are thin. None of them is clipped.
-    #[inline(always)]
-    pub fn for_each_thin(&self, each: impl FnMut(ScreenTriangle) -> ControlFlow<()>) -> ControlFlow<()> {
-        self.for_each_of(&[Kind::Thin], each)
-    }
-
-    #[inline(always)]
-    fn for_each_of(&self, kinds: &[Kind], mut each: impl FnMut(ScreenTriangle) -> ControlFlow<()>) -> ControlFlow<()> {
-        for kind in kinds {
-            for (bin, before) in self.bins.iter().zip(&self.pieces_before) {
-                // One place that calls `each`, so that it is inlined.
-                let (listed, others) = match kind {
-                    Kind::Pieces => {
-                        (&[][..], bin.piece_numbers_in(self.band).map(|piece| PIECE | (before + piece)).collect())
-                    }
-                    Kind::Fronts => bin.fronts.items_in(self.band),
-                    Kind::Backs => bin.backs.items_in(self.band),
-                    Kind::Thin => bin.thin.items_in(self.band),
-                };
-                for ids in [listed, &others] {
-                    for &item in ids {
-                        each(self.get(item))?;
-                    }
-                }
-            }
+    /// Its triangles, each with the pixels that may have points in it, and with its item in place of its id: first what is
+    /// clipped, then what faces the viewer. What faces away is mostly hidden by then.
+    pub fn boxed(&self) -> Vec<Cow<'a, [BoxedFace]>> {
+        let mut lists = Vec::with_capacity(5 * self.bins.len());
+        for (bin, before) in self.bins.iter().zip(&self.pieces_before) {
+            let boxed = |i: u32| self.boxed_piece(PIECE | (before + i), bin.piece(i).1);
+            lists.push(Cow::Owned(bin.piece_numbers_in(self.band).map(boxed).collect()));
         }
-        ControlFlow::Continue(())
+        for list_of in [|bin: &'a TriangleBin| &bin.fronts, |bin: &'a TriangleBin| &bin.backs] {
+            lists.extend(self.boxed_of(list_of));
+        }
+        lists
     }
 
-    /// The triangle of an [`item`](ScreenTriangle::item).
+    /// Those that are thin. None of them is clipped.
+    pub fn thin(&self) -> impl Iterator<Item = Cow<'a, [BoxedFace]>> {
+        self.boxed_of(|bin| &bin.thin)
+    }
+
+    fn boxed_of(&self, list_of: fn(&'a TriangleBin) -> &'a BandLists) -> impl Iterator<Item = Cow<'a, [BoxedFace]>> {
+        self.bins.iter().flat_map(move |bin| {
+            let (listed, others) = list_of(bin).boxed_in(self.band);
+            [Cow::Borrowed(listed), Cow::Owned(others)]
+        })
+    }
+
+    fn boxed_piece(&self, item: u32, corners: &[ScreenVertex; 3]) -> BoxedFace {
+        let plan = self.context.plan;
+        let pixels = |of: fn(&ScreenVertex) -> i32, size: u32| {
+            let [a, b, c] = corners.each_ref().map(|v| of(v) + 128 * size as i32);
+            pair(POINT_GRID.pixels([a.min(b).min(c), a.max(b).max(c)], [0, size as i32]))
+        };
+        let [a, b, c] = corners.each_ref().map(|v| v.z);
+        BoxedFace {
+            id: item,
+            columns: pixels(|v| v.x, plan.width_px),
+            rows: pixels(|v| v.y, plan.height_px),
+            depth_max: a.max(b).max(c),
+        }
+    }
+
+    /// The triangle of an item.
     #[inline(always)]
     pub fn get(&self, item: u32) -> ScreenTriangle {
         if item & PIECE == 0 {
-            return ScreenTriangle { id: item, item, corners: self.context.screen_triangle(item) };
+            return ScreenTriangle { id: item, corners: self.context.screen_triangle(item) };
         }
         self.get_piece(item)
     }
@@ -98,6 +101,6 @@ impl<'a> BandTriangles<'a> {
         let number = item ^ PIECE;
         let bin = self.pieces_before.partition_point(|before| *before <= number).saturating_sub(1);
         let (id, corners) = self.bins[bin].piece(number - self.pieces_before[bin]);
-        ScreenTriangle { id, item, corners: *corners }
+        ScreenTriangle { id, corners: *corners }
     }
 }

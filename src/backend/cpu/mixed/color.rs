@@ -7,7 +7,7 @@ use super::band_triangles::{BandTriangles, ScreenTriangle};
 use super::crowd::Crowd;
 use super::faces::PixelFaces;
 use super::find::MixedPixels;
-use super::lists::{ListsEnd, PIXELS_MAX, PixelLists};
+use super::lists::{Listed, ListsEnd, PIXELS_MAX, PixelLists};
 use super::points::{ALL_WORDS, Lattice, PointSet};
 use super::recent::Recent;
 use super::shares::{Share, Shares};
@@ -25,7 +25,7 @@ use crate::backend::cpu::surface::waiting::{Point, Waiting};
 pub struct Found {
     /// By pixel: premultiplied linear RGBA, nothing behind it.
     pub colors: Vec<[f32; 4]>,
-    /// The pixels, by number, of which some points see nothing, and the points that see something.
+    /// Under lines: the pixels, by number, of which some points see nothing, and the points that see something.
     pub borders: Vec<(u32, PointSet<ALL_WORDS>)>,
 }
 
@@ -67,8 +67,9 @@ fn color_kernel(
     let mut few = Points::<1>::new();
     let mut all = Points::<ALL_WORDS>::new();
     let Found { colors, borders } = found;
+    let has_lines = !plan.lines.is_empty();
     borders.clear();
-    borders.reserve_exact(PIXELS_MAX);
+    borders.reserve_exact(if has_lines { PIXELS_MAX } else { 0 });
     colors.clear();
     colors.reserve_exact(PIXELS_MAX);
     colors.resize(lists.pixels.len(), [0.0; 4]);
@@ -76,21 +77,21 @@ fn color_kernel(
     let mut poll = DeadlinePoll::new(context.deadline);
     for (i, pixel) in lists.pixels.clone().enumerate() {
         let place = pixels.place(pixel, samples, &mut row);
-        let items = (lists.end == ListsEnd::Whole).then(|| lists.of(i));
+        let listed = (lists.end == ListsEnd::Whole).then(|| lists.of(i));
         let own_z = samples.depth[samples.index(place[0] as i32, place[1] as i32, 0)];
         let of_pixel = (i, place, own_z);
         if pixels.needs_few[pixel] {
-            few.see(context, (triangles, recent), items, place);
+            few.see(context, (triangles, recent), listed, place);
             painter.paint(&few.shares, of_pixel, colors);
         } else {
-            all.see(context, (triangles, recent), items, place);
+            all.see(context, (triangles, recent), listed, place);
             painter.paint(&all.shares, of_pixel, colors);
             let seen = all.shares.points();
-            if seen != PointSet::ALL && seen != PointSet::NONE {
+            if has_lines && seen != PointSet::ALL && seen != PointSet::NONE {
                 borders.push((i as u32, seen));
             }
         }
-        if poll.is_expired_after(items.map_or(1, <[u32]>::len) as u64, 0) {
+        if poll.is_expired_after(listed.map_or(1, <[Listed]>::len) as u64, 0) {
             return;
         }
     }
@@ -116,16 +117,19 @@ impl<const W: usize> Points<W> {
         &mut self,
         context: &RasterContext<'_>,
         (triangles, recent): (&BandTriangles<'_>, &mut Recent),
-        items: Option<&[u32]>,
+        listed: Option<&[Listed]>,
         [x, y]: [u32; 2],
     ) {
         let [width, height] = [context.plan.width_px, context.plan.height_px].map(|size| size as i32);
         let corner = [256 * x as i32 - 128 * width, 256 * y as i32 - 128 * height];
-        if let (Some(items), false) = (items, context.is_plain) {
+        if let (Some(listed), false) = (listed, context.is_plain) {
             self.faces.clear();
             let mut has_place = true;
-            for &item in items {
-                if let Some(triangle) = recent.get(triangles, item)
+            for triangle in listed {
+                if self.faces.are_nearer_than(triangle.nearest) {
+                    continue;
+                }
+                if let Some(triangle) = recent.get(triangles, triangle.item)
                     && !self.faces.offer(context.isa, triangle, corner)
                 {
                     has_place = false;
@@ -136,7 +140,7 @@ impl<const W: usize> Points<W> {
                 return self.faces.shares(&mut self.shares);
             }
         }
-        self.see_many(context, triangles, items, corner);
+        self.see_many(context, triangles, listed, corner);
     }
 
     /// The same, for pixels of many faces.
@@ -145,7 +149,7 @@ impl<const W: usize> Points<W> {
         &mut self,
         context: &RasterContext<'_>,
         triangles: &BandTriangles<'_>,
-        items: Option<&[u32]>,
+        listed: Option<&[Listed]>,
         corner: [i32; 2],
     ) {
         let mut crowd = Crowd::EMPTY;
@@ -158,8 +162,8 @@ impl<const W: usize> Points<W> {
             if is_expired { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         // A picture whose deadline has passed is thrown away.
-        let _ = match items {
-            Some(items) => items.iter().try_for_each(|&item| offer(triangles.get(item))),
+        let _ = match listed {
+            Some(listed) => listed.iter().try_for_each(|triangle| offer(triangles.get(triangle.item))),
             None => triangles.for_each(offer),
         };
         crowd.shares(&mut self.shares);

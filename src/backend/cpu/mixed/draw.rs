@@ -2,7 +2,7 @@
 
 use super::band_triangles::BandTriangles;
 use super::color::{Found, color};
-use super::find::{MixedPixels, find};
+use super::find::{Finder, MixedPixels, find};
 use super::lists::{ListsEnd, PIXELS_MAX, PixelLists, fill};
 use super::recent::Recent;
 use crate::backend::cpu::RasterContext;
@@ -15,6 +15,7 @@ use crate::backend::cpu::lines::coverage::BorderPoints;
 pub struct MixedScratch {
     /// The band's mixed pixels.
     pub pixels: MixedPixels,
+    finder: Finder,
     /// The triangles that some of them may show.
     lists: PixelLists,
     recent: Recent,
@@ -27,13 +28,23 @@ pub struct MixedScratch {
 impl MixedScratch {
     /// Allocated memory, bytes.
     pub fn bytes(&self) -> usize {
-        self.pixels.bytes() + self.lists.bytes() + self.recent.bytes() + self.found.bytes() + self.border.bytes()
+        self.pixels.bytes()
+            + self.finder.bytes()
+            + self.lists.bytes()
+            + self.recent.bytes()
+            + self.found.bytes()
+            + self.border.bytes()
     }
 
     /// The [`bytes`](Self::bytes) of a band of so many columns and rows, at most.
     pub const fn bytes_of(size: [usize; 2]) -> usize {
         let border = size[0] * size[1] * BorderPoints::PIXEL_BYTES;
-        MixedPixels::bytes_of(size) + PixelLists::BYTES_MAX + Recent::BYTES_MAX + Found::BYTES_MAX + border
+        MixedPixels::bytes_of(size)
+            + Finder::bytes_of(size)
+            + PixelLists::BYTES_MAX
+            + Recent::BYTES_MAX
+            + Found::BYTES_MAX
+            + border
     }
 }
 
@@ -46,9 +57,9 @@ pub fn draw_mixed(
     scratch: &mut MixedScratch,
     mut each: impl FnMut(u32, u32, [f32; 4]),
 ) {
-    let MixedScratch { pixels, lists, recent, found, border } = scratch;
+    let MixedScratch { pixels, finder, lists, recent, found, border } = scratch;
     let triangles = BandTriangles::new(context, bins);
-    find(context.isa, context, &triangles, samples, pixels);
+    find(context.isa, context, &triangles, samples, finder, pixels);
     let all = pixels.columns.len();
     context.watch.count_mixed(all);
     recent.clear();

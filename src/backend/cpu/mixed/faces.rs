@@ -40,17 +40,14 @@ impl<const W: usize> Face<W> {
 
     /// Those of the points at which this face hides another one: of equal depths, the lower id is in front.
     #[inline(always)]
-    fn hides(&self, other: &Self, points: PointSet<W>) -> PointSet<W> {
+    fn hides(&self, isa: Isa, other: &Self, points: PointSet<W>) -> PointSet<W> {
         if self.extremes[0] > other.extremes[1] {
             return points;
         }
         if self.extremes[1] < other.extremes[0] {
             return PointSet::NONE;
         }
-        points.filter(|i| {
-            let (own, of_other) = (self.plane.at::<W>(i), other.plane.at::<W>(i));
-            own > of_other || (own == of_other && self.id < other.id)
-        })
+        self.plane.nearer(isa, &other.plane, points, self.id < other.id)
     }
 }
 
@@ -62,6 +59,12 @@ impl<const W: usize> PixelFaces<W> {
     #[inline(always)]
     pub fn clear(&mut self) {
         (self.covered, self.farthest, self.count) = (PointSet::NONE, 0.0, 0);
+    }
+
+    /// True if all points see something nearer than this depth.
+    #[inline(always)]
+    pub fn are_nearer_than(&self, depth: f32) -> bool {
+        depth < self.farthest
     }
 
     /// Its faces, in no order.
@@ -83,9 +86,6 @@ impl<const W: usize> PixelFaces<W> {
     /// False if there is no place for it. Then others may have lost points to it, and all are to be offered again.
     #[inline(always)]
     pub fn offer(&mut self, isa: Isa, triangle: &mut PointTriangle, corner: [i32; 2]) -> bool {
-        if triangle.nearest < self.farthest {
-            return true;
-        }
         let Some(outline) = triangle.at(corner) else { return true };
         let plane = triangle.plane_at(corner);
         let extremes = plane.extremes();
@@ -99,7 +99,7 @@ impl<const W: usize> PixelFaces<W> {
         }
         let mut face = Face { id: triangle.id, points, plane, extremes };
         if !points.and(self.covered).is_empty() {
-            self.part(&mut face);
+            self.part(isa, &mut face);
         }
         if face.points.is_empty() {
             return true;
@@ -121,19 +121,23 @@ impl<const W: usize> PixelFaces<W> {
 
     /// Parts the points that a face and others cover by who is in front. Faces that are hidden lose their places.
     #[inline(always)]
-    fn part(&mut self, face: &mut Face<W>) {
-        let mut kept = 0;
-        for i in 0..self.count {
-            let mut other = self.faces[i];
+    fn part(&mut self, isa: Isa, face: &mut Face<W>) {
+        let mut i = 0;
+        while i < self.count {
+            let other = &mut self.faces[i];
             let both = other.points.and(face.points);
-            if !both.is_empty() {
-                let won = face.hides(&other, both);
-                other.points = other.points.without(won);
-                face.points = face.points.without(both.without(won));
+            i += 1;
+            if both.is_empty() {
+                continue;
             }
-            self.faces[kept] = other;
-            kept += usize::from(!other.points.is_empty());
+            let won = face.hides(isa, other, both);
+            other.points = other.points.without(won);
+            face.points = face.points.without(both.without(won));
+            if other.points.is_empty() {
+                i -= 1;
+                self.count -= 1;
+                self.faces[i] = self.faces[self.count];
+            }
         }
-        self.count = kept;
     }
 }

@@ -14,9 +14,11 @@ pub(crate) mod draw;
 mod faces;
 pub(crate) mod find;
 pub(crate) mod lists;
-#[cfg(target_arch = "x86_64")]
-mod outside_avx2;
 pub(crate) mod points;
+#[cfg(target_arch = "x86_64")]
+mod points_avx2;
+#[cfg(target_arch = "x86_64")]
+mod points_avx512;
 mod recent;
 mod shares;
 pub(crate) mod thinness;

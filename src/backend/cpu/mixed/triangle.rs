@@ -43,21 +43,21 @@ type Edge = [i32; 3];
 /// Bound of edge functions in a pixel: what lies beyond has all of it inside, or outside.
 pub const EDGE_MAX: i32 = 1 << 30;
 
-/// The edge function of an edge that has all of a pixel inside.
-const NO_EDGE: Edge = [0; 3];
-
-/// A triangle in a pixel, without its depth.
-pub struct Outline([Edge; 3]);
+/// A triangle in a pixel, without its depth: its edges that have points on both sides, which come first.
+pub struct Outline {
+    edges: [Edge; 3],
+    count: usize,
+}
 
 /// The depth of a triangle in a pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane {
     /// The first point from the triangle's first corner, 1/512 px.
-    from: [i32; 2],
+    pub from: [i32; 2],
     /// As [`Setup::depth`].
-    depth: [f32; 3],
+    pub depth: [f32; 3],
     /// As [`Setup::depth_range`].
-    range: [f32; 2],
+    pub range: [f32; 2],
 }
 
 impl PointTriangle {
@@ -89,13 +89,12 @@ impl PointTriangle {
         if all < 0 {
             return None;
         }
-        let mut edges = [NO_EDGE; 3];
+        let (mut edges, mut count) = ([[0; 3]; 3], 0);
         for k in 0..3 {
-            if first[k] + i64::from(decline[k]) < 0 {
-                edges[k] = [first[k].clamp(-i64::from(EDGE_MAX), EDGE_MAX.into()) as i32, dx[k], dy[k]];
-            }
+            edges[count] = [first[k].clamp(-i64::from(EDGE_MAX), EDGE_MAX.into()) as i32, dx[k], dy[k]];
+            count += usize::from(first[k] + i64::from(decline[k]) < 0);
         }
-        Some(Outline(edges))
+        Some(Outline { edges, count })
     }
 
     /// The depth in the pixel with this corner.
@@ -144,6 +143,22 @@ impl Plane {
         self.at_place(Lattice::<W>::place(i))
     }
 
+    /// Those of some points at which this plane is nearer than the other, or as near if it wins ties.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub fn nearer<const W: usize>(&self, isa: Isa, other: &Self, points: PointSet<W>, wins_ties: bool) -> PointSet<W> {
+        #[cfg(target_arch = "x86_64")]
+        if isa.has_avx2() {
+            // SAFETY: `has_avx2` is true where the processor has AVX2.
+            return unsafe { super::points_avx2::nearer(self, other, points, wins_ties) };
+        }
+        let _ = isa;
+        points.filter(|i| {
+            let (own, of_other) = (self.at::<W>(i), other.at::<W>(i));
+            own > of_other || (own == of_other && wins_ties)
+        })
+    }
+
     #[inline(always)]
     fn at_place(&self, place: [i32; 2]) -> f32 {
         let x = (self.from[0] + 2 * place[0]) as f32 * 0.5;
@@ -165,10 +180,8 @@ impl Outline {
     #[inline(always)]
     pub fn inside<const W: usize>(&self, isa: Isa) -> PointSet<W> {
         let mut inside = PointSet::ALL;
-        for edge in self.0 {
-            if edge != NO_EDGE {
-                inside = inside.without(outside(isa, edge));
-            }
+        for edge in &self.edges[..self.count] {
+            inside = inside.without(outside(isa, *edge));
         }
         inside
     }
@@ -179,9 +192,12 @@ impl Outline {
 #[allow(unsafe_code)]
 fn outside<const W: usize>(isa: Isa, edge: Edge) -> PointSet<W> {
     #[cfg(target_arch = "x86_64")]
-    if isa.has_avx2() {
+    if isa.has_avx512() {
+        // SAFETY: `has_avx512` is true where the processor has AVX-512F.
+        return unsafe { super::points_avx512::outside(edge) };
+    } else if isa.has_avx2() {
         // SAFETY: `has_avx2` is true where the processor has AVX2.
-        return unsafe { super::outside_avx2::outside(edge) };
+        return unsafe { super::points_avx2::outside(edge) };
     }
     let _ = isa;
     outside_plainly(edge)
@@ -227,6 +243,42 @@ mod tests {
             }
         }
         assert!(mixed > 2_000, "{mixed}");
+    }
+
+    #[test]
+    fn each_instruction_set_finds_the_same_points_nearer() {
+        let mut state = 0x1234_5678_9ABC_DEF1;
+        let (mut parted, mut ties) = (0, 0);
+        for round in 0..3_000 {
+            let mut depth = || (next(&mut state) >> 8) as f32 / (1 << 24) as f32;
+            let depths: [[f32; 3]; 2] = [0, 1].map(|_| [0.5 + 1e-3 * depth(), 1e-4 * depth(), 1e-4 * depth()]);
+            let mut plane =
+                |depth: [f32; 3]| Plane { from: [0, 1].map(|_| next(&mut state) >> 22), depth, range: [0.49, 0.51] };
+            let own = plane(depths[0]);
+            // Planes that are the same have ties alone.
+            let other = if round % 4 == 0 { own } else { plane(depths[1]) };
+            let asked = PointSet::<ALL_WORDS>([0, 1, 2, 3].map(|_| u64::from(next(&mut state) as u32) << (round % 33)));
+            for wins_ties in [false, true] {
+                let is_nearer = |i: usize| {
+                    let (own, other) = (own.at::<ALL_WORDS>(i), other.at::<ALL_WORDS>(i));
+                    own > other || (own == other && wins_ties)
+                };
+                let want = asked.filter(is_nearer);
+                parted += usize::from(want != asked && !want.is_empty());
+                ties += usize::from(round % 4 == 0 && wins_ties && want == asked);
+                let few = PointSet::<1>([asked.0[0]]);
+                for isa in Isa::available() {
+                    assert_eq!(own.nearer(isa, &other, asked, wins_ties), want, "{isa:?} {own:?} {other:?}");
+                    let of_few = own.nearer(isa, &other, few, wins_ties);
+                    let is_nearer = |i: usize| {
+                        let (own, other) = (own.at::<1>(i), other.at::<1>(i));
+                        own > other || (own == other && wins_ties)
+                    };
+                    assert_eq!(of_few, few.filter(is_nearer), "{isa:?} {own:?} {other:?}");
+                }
+            }
+        }
+        assert!(parted > 500 && ties > 700, "{parted} {ties}");
     }
 
     #[test]

@@ -43,7 +43,7 @@ fn order_of(bits: u32) -> __m256i {
 /// As `keep_plainly`, given the pass's triangles.
 #[target_feature(enable = "avx2")]
 pub fn keep(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass, triangles: &[[u32; 3]]) -> Kept {
-    let mut kept = Kept::with_room_for(triangles.len());
+    let mut kept = Kept::with_room_for(triangles.len(), bounds);
     for (first, group) in pass.ids.clone().step_by(LANES).zip(triangles.chunks(LANES)) {
         let mut padded = [group[0]; LANES];
         let triangles = group.first_chunk().unwrap_or_else(|| {
@@ -57,15 +57,19 @@ pub fn keep(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass, t
         kept.sides.push(Sides { front: (lanes.front & whole) as u8, back: (lanes.back & whole) as u8 });
         let (front, back) = (lanes.front & lanes.seen & drawn[0], lanes.back & lanes.seen & drawn[1]);
         if front != 0 {
+            if bounds.has_mixed {
+                lanes.put_boxed(first, front, &mut kept.fronts);
+            }
             lanes.put(first, front, &mut kept.fronts);
         }
         if back != 0 {
             lanes.put_boxed(first, back, &mut kept.backs);
             lanes.put(first, back, &mut kept.backs);
         }
-        if bounds.needs_thin && front | back != 0 {
+        if bounds.has_mixed && front | back != 0 {
             let thin = thin(&corners, front | back);
             if thin != 0 {
+                lanes.put_boxed(first, thin, &mut kept.thin);
                 lanes.put(first, thin, &mut kept.thin);
             }
         }

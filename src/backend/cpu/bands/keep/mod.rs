@@ -67,8 +67,8 @@ impl TrianglePass {
 /// The rectangle of the picture that has samples, and its bands.
 pub struct Bounds {
     pub grid: SampleGrid,
-    /// True if thin triangles are looked for.
-    pub needs_thin: bool,
+    /// True for pictures with mixed pixels: thin triangles are looked for, and those that face the viewer have boxes.
+    pub has_mixed: bool,
     /// The picture's centre, 1/256 px from its corner.
     pub half: [i32; 2],
     /// Columns, and rows, that have samples.
@@ -85,7 +85,7 @@ impl Bounds {
     /// Those of a plan's picture.
     pub fn new(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2]) -> Self {
         Self {
-            needs_thin: plan.has_mixed(),
+            has_mixed: plan.has_mixed(),
             grid: if plan.is_adaptive { POINT_GRID } else { SampleGrid::new(plan.samples) },
             half: [plan.width_px, plan.height_px].map(|size| size as i32 * 128),
             ranges: [plan.seen_range(plan.width_px), plan.seen_range(plan.height_px)],
@@ -125,11 +125,11 @@ impl Bounds {
 
 /// Triangles of a chunk that culling leaves.
 pub struct Kept {
-    /// Triangles that face the viewer.
+    /// Triangles that face the viewer; with boxes if the picture has mixed pixels.
     pub fronts: KeptFaces,
     /// Triangles that face away, with boxes.
     pub backs: KeptFaces,
-    /// Those of both that are thin.
+    /// Those of both that are thin, with boxes.
     pub thin: KeptFaces,
     /// Triangles with a corner behind the eye or far outside the picture.
     pub outside: Vec<u32>,
@@ -147,9 +147,9 @@ pub struct Sides {
 
 impl Kept {
     /// Room for so many triangles.
-    pub fn with_room_for(triangles: usize) -> Self {
+    pub fn with_room_for(triangles: usize, bounds: &Bounds) -> Self {
         Self {
-            fronts: KeptFaces::with_room_for(triangles, false),
+            fronts: KeptFaces::with_room_for(triangles, bounds.has_mixed),
             backs: KeptFaces::with_room_for(triangles, true),
             thin: KeptFaces::default(),
             outside: Vec::new(),
@@ -170,7 +170,7 @@ pub fn keep(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass) -
 }
 
 fn keep_plainly(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass) -> Kept {
-    let mut kept = Kept::with_room_for(pass.ids.len());
+    let mut kept = Kept::with_room_for(pass.ids.len(), bounds);
     for first in pass.ids.clone().step_by(LANES) {
         let len = (pass.ids.end - first).min(LANES);
         let mut ids = [first as u32; LANES];
@@ -191,6 +191,9 @@ fn keep_plainly(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePas
             if lane.is_seen && lane.area < 0 && is_drawn(0) {
                 kept.fronts.ids.push(ids[l]);
                 kept.fronts.spans.push(lane.span);
+                if bounds.has_mixed {
+                    kept.fronts.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
+                }
             }
             if lane.is_seen && lane.area > 0 && is_drawn(1) {
                 kept.backs.ids.push(ids[l]);
@@ -200,6 +203,7 @@ fn keep_plainly(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePas
             let is_shown = lane.area < 0 && is_drawn(0) || lane.area > 0 && is_drawn(1);
             if lane.is_seen && is_shown && lane.is_thin {
                 kept.thin.ids.push(ids[l]);
+                kept.thin.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
                 kept.thin.spans.push(lane.span);
             }
         }
@@ -233,7 +237,7 @@ impl Lane {
         Self {
             is_outside,
             is_seen,
-            is_thin: bounds.needs_thin && is_thin(x, y, area),
+            is_thin: bounds.has_mixed && is_thin(x, y, area),
             area,
             span: if is_seen { pair([top / bounds.rows, bottom / bounds.rows]) } else { 0 },
             boxed: BoxedFace { id: 0, columns: pair(columns), rows: pair(rows), depth_max: z[0].max(z[1]).max(z[2]) },

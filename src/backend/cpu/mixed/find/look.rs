@@ -3,6 +3,7 @@
 //! Looks are compared, not shown. They are made of numbers that both back-ends have to the bit: colours
 //! that are shaded may differ in their last place.
 
+use super::coarse::CoarseLooks;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::NOTHING;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
@@ -64,18 +65,18 @@ pub enum Step {
 
 /// Ranges of what decides colours, of one face or of several.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Look {
+pub struct Look {
     /// Smallest values: of normals, or of colours.
-    low: [f32; 3],
+    pub low: [f32; 3],
     /// Largest values.
-    high: [f32; 3],
+    pub high: [f32; 3],
     /// Smallest and largest key. Faces with different keys never look alike.
-    keys: [u32; 2],
+    pub keys: [u32; 2],
 }
 
 impl Look {
     /// The look of no face at all.
-    const NOTHING: Self = Self { low: [0.0; 3], high: [0.0; 3], keys: [kinds::UNIQUE | NOTHING; 2] };
+    pub const NOTHING: Self = Self { low: [0.0; 3], high: [0.0; 3], keys: [kinds::UNIQUE | NOTHING; 2] };
 
     /// A look of one value.
     #[inline(always)]
@@ -110,9 +111,8 @@ impl Look {
             return Self::of_one(shifted(face_normal(surface, id)), key);
         }
         let Some([a, b, c]) = corner_normals(surface, id) else { return unique() };
-        [shifted(b), shifted(c)]
-            .into_iter()
-            .fold(Self::of_one(shifted(a), key), |all, v| all.and(&Self::of_one(v, key)))
+        let of_corner = |n: [f32; 3]| Self::of_one(shifted(n), key);
+        of_corner(a).and(&of_corner(b)).and(&of_corner(c))
     }
 
     /// True for faces that only their normal tells from others of their material, the same at all corners.
@@ -135,7 +135,7 @@ impl Look {
 
     /// The step from the colours of these faces to those of others.
     #[inline(always)]
-    fn step_to(&self, other: &Self) -> Step {
+    pub fn step_to(&self, other: &Self) -> Step {
         let all = self.and(other);
         if all.keys[0] != all.keys[1] {
             return Step::Hard;
@@ -159,6 +159,8 @@ pub struct Pairs {
     steps: [Pair; Pairs::STEPS],
     /// Id and look of a face.
     looks: [(u32, Look); Pairs::LOOKS],
+    /// The looks of more faces.
+    pub coarse: CoarseLooks,
 }
 
 #[derive(Clone, Copy)]
@@ -176,6 +178,7 @@ impl Pairs {
         Self {
             steps: [Pair { ids: [NOTHING; 2], step: Step::None }; Self::STEPS],
             looks: [(NOTHING, Look::NOTHING); Self::LOOKS],
+            coarse: CoarseLooks::new(),
         }
     }
 
@@ -188,6 +191,9 @@ impl Pairs {
         let ids = [a.min(b), a.max(b)];
         let place = ids[0].wrapping_mul(5).wrapping_add(ids[1]) as usize % Self::STEPS;
         if self.steps[place].ids != ids {
+            if self.coarse.are_alike(ids) {
+                return Step::None;
+            }
             self.steps[place] = Pair { ids, step: self.new_step(context, ids) };
         }
         self.steps[place].step
@@ -195,12 +201,21 @@ impl Pairs {
 
     #[inline(never)]
     fn new_step(&mut self, context: &RasterContext<'_>, [a, b]: [u32; 2]) -> Step {
-        let looks = [a, b].map(|id| self.look(context, id));
-        match looks[0].step_to(&looks[1]) {
+        let (of_a, of_b) = (self.look(context, a), self.look(context, b));
+        match of_a.step_to(&of_b) {
             Step::None => Step::None,
             // Links cannot lower this step: the normals were compared.
-            step if looks.iter().all(Look::is_of_one_normal) => step,
+            step if of_a.is_of_one_normal() && of_b.is_of_one_normal() => step,
             step => step.min(step_of_linked(context, a, b)),
+        }
+    }
+
+    /// Remembers the look of an id.
+    #[inline(always)]
+    pub fn remember(&mut self, context: &RasterContext<'_>, id: u32) {
+        if id != NOTHING && !self.coarse.has(id) {
+            let look = self.look(context, id);
+            self.coarse.put(id, &look);
         }
     }
 
@@ -233,7 +248,11 @@ fn normal_values(material: &ShadedMaterial, normal: [f32; 3], front: bool) -> [f
     let may_be_smooth =
         material.roughness < MIRROR_ROUGHNESS || material.textures[slots::METALLIC_ROUGHNESS].texture != TEXTURE_NONE;
     let scale = if material.metallic > 0.0 && may_be_smooth { MIRROR_SCALE } else { 1.0 };
-    turned_to_viewer(normal, front).map(|v| scale * (v + NORMAL_SHIFT))
+    let mut values = turned_to_viewer(normal, front);
+    for k in 0..3 {
+        values[k] = scale * (values[k] + NORMAL_SHIFT);
+    }
+    values
 }
 
 #[inline(always)]

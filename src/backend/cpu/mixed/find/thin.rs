@@ -3,9 +3,10 @@
 //! Each is followed along its longer side, and every pixel that it touches is marked where some sample sees what lies
 //! behind it, and colours break off from there to it. That pixel alone is mixed then, and not its neighbours.
 
+use super::breaks;
 use super::look::Pairs;
-use super::{MixedPixels, breaks};
 use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::bands::lists::{BoxedFace, unpair};
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::mixed::band_triangles::ScreenTriangle;
@@ -16,14 +17,42 @@ use crate::backend::cpu::mixed::triangle::PointTriangle;
 /// since integers decide which of them the triangle touches.
 pub const SLACK: i32 = 4;
 
-/// Marks the pixels of a band in which a thin triangle may be seen. The number of samples that were looked at.
+/// Pixels of a box that are few enough to be looked at in advance.
+const FEW: i32 = 16;
+
+/// False for triangles of few pixels that all see the triangle, or what lies in front of it.
+#[inline(always)]
+pub fn may_be_seen(band: &SampleBand, face: &BoxedFace) -> bool {
+    let [[left, right], [top, bottom]] = [face.columns, face.rows].map(unpair);
+    let [left, right] = [left.max(0), right.min(band.size_px[0] as i32 - 1)];
+    let [top, bottom] = [top.max(band.shown[0] as i32), bottom.min(band.shown[1] as i32 - 1)];
+    if (right - left + 1) * (bottom - top + 1) > FEW {
+        return true;
+    }
+    for y in top..=bottom {
+        for x in left..=right {
+            let (ids, depths) = band.pixel(x, y);
+            if is_before(face.depth_max, depths) && !ids.contains(&face.id) {
+                return true;
+            }
+        }
+    }
+    false
+}
+
+#[inline(always)]
+fn is_before(nearest: f32, depths: &[f32]) -> bool {
+    depths.iter().any(|depth| nearest > *depth)
+}
+
+/// Marks the pixels of a band's shown rows in which a thin triangle may be seen. The number of samples that were looked at.
 #[inline(never)]
 pub fn mark_thin(
     context: &RasterContext<'_>,
     band: &SampleBand,
     triangle: &ScreenTriangle,
     pairs: &mut Pairs,
-    mixed: &mut MixedPixels,
+    marks: &mut [u8],
 ) -> usize {
     let ScreenTriangle { id, corners, .. } = triangle;
     let nearest = corners.iter().map(|v| v.z).fold(0.0, f32::max);
@@ -34,7 +63,7 @@ pub fn mark_thin(
     for_each_pixel(corners, [width, height], band.shown.map(|row| row as i32), |[x, y]| {
         let (ids, depths) = band.pixel(x, y);
         looked_at += ids.len();
-        if !depths.iter().any(|depth| nearest > *depth) || ids.contains(id) {
+        if !is_before(nearest, depths) || ids.contains(id) {
             return;
         }
         if points.is_none() {
@@ -48,7 +77,7 @@ pub fn mark_thin(
         for (&seen, _) in ids.iter().zip(depths).filter(|(_, depth)| nearest > **depth) {
             found |= pairs.step(context, seen, *id).breaks(breaks::THIN);
         }
-        mixed.thin[(y - first) as usize * width as usize + x as usize] |= found;
+        marks[(y - first) as usize * width as usize + x as usize] |= found;
     });
     looked_at
 }

@@ -1,11 +1,12 @@
-//! Stage mixed: the points that lie outside an edge, in AVX2 instructions. Compilers make much longer code of
-//! "a bit for each sign".
+//! Stage mixed: tests of a pixel's points in AVX2 instructions, eight points at a time. Compilers make much longer code
+//! of "a bit for each sign".
 
 #![allow(unsafe_code)]
 
 use std::arch::x86_64::*;
 
 use super::points::{Lattice, PointSet};
+use super::triangle::Plane;
 use crate::backend::cpu::isa::LANES;
 use crate::backend::sample_partition::{GENERATORS, POINTS};
 
@@ -67,6 +68,45 @@ pub fn outside<const W: usize>([c, dx, dy]: [i32; 3]) -> PointSet<W> {
         *word = u64::from(halves[0]) | u64::from(halves[1]) << 32;
     }
     set
+}
+
+/// As `Plane::nearer`.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub fn nearer<const W: usize>(own: &Plane, other: &Plane, points: PointSet<W>, wins_ties: bool) -> PointSet<W> {
+    let ties = _mm256_castsi256_ps(_mm256_set1_epi32(if wins_ties { -1 } else { 0 }));
+    let [columns, rows] = &Lattice::<W>::PLACES;
+    let mut nearer = points;
+    for ((word, columns), rows) in nearer.0.iter_mut().zip(columns).zip(rows) {
+        let mut bits = 0;
+        for (i, (columns, rows)) in columns.as_chunks::<LANES>().0.iter().zip(rows.as_chunks::<LANES>().0).enumerate() {
+            let asked = *word >> (LANES * i) & 255;
+            if asked == 0 {
+                continue;
+            }
+            let places = [load(columns), load(rows)];
+            let [own, other] = [depths(own, places), depths(other, places)];
+            let is_tie = _mm256_and_ps(_mm256_cmp_ps::<_CMP_EQ_OQ>(own, other), ties);
+            let is_nearer = _mm256_or_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(own, other), is_tie);
+            bits |= (asked & _mm256_movemask_ps(is_nearer) as u64) << (LANES * i);
+        }
+        *word = bits;
+    }
+    nearer
+}
+
+/// As `Plane::at_place` of eight places.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn depths(plane: &Plane, places: [__m256i; 2]) -> __m256 {
+    let along = |axis: usize| {
+        let place = _mm256_add_epi32(_mm256_set1_epi32(plane.from[axis]), _mm256_slli_epi32::<1>(places[axis]));
+        let place = _mm256_mul_ps(_mm256_cvtepi32_ps(place), _mm256_set1_ps(0.5));
+        _mm256_mul_ps(_mm256_set1_ps(plane.depth[1 + axis]), place)
+    };
+    let depth = _mm256_add_ps(_mm256_add_ps(_mm256_set1_ps(plane.depth[0]), along(0)), along(1));
+    let depth = _mm256_max_ps(depth, _mm256_set1_ps(plane.range[0]));
+    _mm256_min_ps(depth, _mm256_set1_ps(plane.range[1]))
 }
 
 #[inline]

@@ -1,0 +1,179 @@
+//! Stage mixed, per pixel: a quick test that most pixels pass whose faces look alike.
+//!
+//! Looks are kept in bytes. Where the bytes of several faces lie close together, so do the looks of all pairs of them; where
+//! they do not, the looks themselves are compared.
+
+use super::look::{ALIKE, Look, kinds};
+use crate::backend::cpu::geometry::samples::NOTHING;
+
+/// Faces that are remembered: a power of two.
+const COUNT: usize = 4096;
+
+/// Steps of a byte per unit of the square root of a value.
+const STEPS: f32 = 79.0;
+
+/// Largest difference of bytes that tells that values are alike.
+///
+/// Values a and b are alike if (a - b)^2 <= [`ALIKE`] (a + b). With u and v for their square roots, (a - b)^2 is
+/// (u - v)^2 (u + v)^2, which is at most (u - v)^2 times 2 (a + b). So (u - v)^2 <= [`ALIKE`] / 2 suffices.
+const ALIKE_STEPS: u8 = 7;
+
+/// Of the ranges of three values and the key: the bits that are 0 where faces are alike.
+const UNLIKE_BITS: u32 = !u32::from_le_bytes([ALIKE_STEPS, ALIKE_STEPS, ALIKE_STEPS, 0]);
+
+const _: () = {
+    // So that no more than the steps have the other bits.
+    assert!((ALIKE_STEPS + 1).is_power_of_two());
+    let difference = (ALIKE_STEPS as f32 + 1.0) / STEPS;
+    assert!(difference * difference < ALIKE / 2.0 * 0.99);
+};
+
+/// Key byte of the outline's triangles. Materials have the lower ones.
+const BY_COLOR: u8 = 254;
+
+/// A look in bytes, from the lowest: the smallest three values and the key, then the largest ones and the key, subtracted
+/// from 255.
+type Bytes = u64;
+
+/// Bytes of a face that is like no other.
+const UNLIKE: Bytes = 0;
+
+/// The looks of faces that were looked at last.
+pub struct CoarseLooks {
+    ids: Box<[u32; COUNT]>,
+    looks: Box<[Bytes; COUNT]>,
+}
+
+impl CoarseLooks {
+    /// None.
+    pub fn new() -> Self {
+        Self { ids: Box::new([NOTHING; COUNT]), looks: Box::new([UNLIKE; COUNT]) }
+    }
+
+    /// True if the face is remembered.
+    #[inline(always)]
+    pub fn has(&self, id: u32) -> bool {
+        self.ids[id as usize % COUNT] == id
+    }
+
+    /// Remembers a face.
+    #[inline(always)]
+    pub fn put(&mut self, id: u32, look: &Look) {
+        let place = id as usize % COUNT;
+        (self.ids[place], self.looks[place]) = (id, bytes_of(look));
+    }
+
+    /// True only if each pair of some faces looks alike.
+    #[inline(always)]
+    pub fn are_alike<const N: usize>(&self, ids: [u32; N]) -> bool {
+        let mut least = u64::MAX;
+        let mut is_known = true;
+        for id in ids {
+            let place = id as usize % COUNT;
+            is_known &= self.ids[place] == id;
+            least = smallest_bytes(least, self.looks[place]);
+        }
+        // No sum of two bytes is more than 255, so they are added side by side.
+        let ranges = !(least as u32).wrapping_add((least >> 32) as u32);
+        is_known & (ranges & UNLIKE_BITS == 0)
+    }
+}
+
+/// The smaller ones of the bytes of two numbers.
+#[inline(always)]
+#[allow(unsafe_code)]
+fn smallest_bytes(a: u64, b: u64) -> u64 {
+    // Compilers look at the bytes one by one.
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_mm_cvtsi64_si128, _mm_cvtsi128_si64, _mm_min_epu8};
+        // SAFETY: every processor of this architecture has SSE2.
+        unsafe { _mm_cvtsi128_si64(_mm_min_epu8(_mm_cvtsi64_si128(a as i64), _mm_cvtsi64_si128(b as i64))) as u64 }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        let (mut a, b) = (a.to_ne_bytes(), b.to_ne_bytes());
+        for k in 0..8 {
+            a[k] = a[k].min(b[k]);
+        }
+        u64::from_ne_bytes(a)
+    }
+}
+
+#[inline(always)]
+fn bytes_of(look: &Look) -> Bytes {
+    let index = look.keys[0] & !(3 << 30);
+    let key = match look.keys[0] & 3 << 30 {
+        kinds::BY_NORMAL if index < u32::from(BY_COLOR) => index as u8,
+        kinds::BY_COLOR => BY_COLOR,
+        _ => return UNLIKE,
+    };
+    let mut bytes = [key, key, key, key, !key, !key, !key, !key];
+    for k in 0..3 {
+        let (low, high) = (look.low[k].sqrt() * STEPS, look.high[k].sqrt() * STEPS);
+        // Not a number is not in a range.
+        if !(0.0..255.0).contains(&low) || !(0.0..255.0).contains(&high) {
+            return UNLIKE;
+        }
+        (bytes[k], bytes[4 + k]) = (low as u8, !(high as u8));
+    }
+    u64::from_le_bytes(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::cpu::mixed::find::look::{NORMAL_SHIFT, Step};
+
+    /// The looks of faces with normals of up to so many steps from one another, seen by three corners.
+    #[test]
+    fn faces_that_pass_look_alike() {
+        let mut state = 3_u32;
+        let mut chance = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let (mut passed, mut alike) = (0, 0);
+        for round in 0..20_000_u32 {
+            let center = [0; 3].map(|_| 2.0 * chance() - 1.0);
+            let spread = [0.02, 0.1, 0.2, 0.4][round as usize % 4];
+            let mut looks = [Look::NOTHING; 3];
+            for (i, look) in looks.iter_mut().enumerate() {
+                let [a, b] = [0; 2].map(|_| center.map(|v| v + NORMAL_SHIFT + spread * (chance() - 0.5)));
+                let material = if round % 16 == 0 { i as u32 / 2 } else { round % 300 };
+                *look = Look { low: a, high: a, keys: [kinds::BY_NORMAL | material; 2] };
+                for k in 0..3 {
+                    (look.low[k], look.high[k]) = (a[k].min(b[k]), a[k].max(b[k]));
+                }
+            }
+            let mut coarse = CoarseLooks::new();
+            let ids = [round, round + 1, round + 70_000];
+            for (id, look) in ids.iter().zip(&looks) {
+                coarse.put(*id, look);
+            }
+            let is_alike = (0..3).all(|i| looks[i].step_to(&looks[(i + 1) % 3]) == Step::None);
+            let is_passed = coarse.are_alike(ids);
+            assert!(is_alike || !is_passed, "{looks:?}");
+            assert!(!coarse.are_alike([ids[0], round + 7]), "a face that is not known");
+            assert!(!coarse.are_alike([ids[0], NOTHING]), "nothing");
+            (passed, alike) = (passed + usize::from(is_passed), alike + usize::from(is_alike));
+        }
+        assert!(passed > 5_000 && passed < alike && 2 * passed > alike, "{passed} of {alike}");
+    }
+
+    #[test]
+    fn faces_like_no_other_do_not_pass() {
+        let normal = |v: f32, material: u32| Look { low: [v; 3], high: [v; 3], keys: [kinds::BY_NORMAL | material; 2] };
+        let is_passed = |look: Look| {
+            let mut coarse = CoarseLooks::new();
+            coarse.put(5, &look);
+            coarse.put(6, &look);
+            coarse.are_alike([5, 6])
+        };
+        assert!(is_passed(normal(1.5, 0)) && is_passed(normal(1.5, 253)));
+        assert!(!is_passed(normal(1.5, 254)) && !is_passed(normal(1.5, 70_000)), "more materials than bytes");
+        assert!(!is_passed(normal(f32::NAN, 0)) && !is_passed(normal(-1.0, 0)) && !is_passed(normal(640.0, 0)));
+        assert!(!is_passed(Look { keys: [kinds::UNIQUE | 5; 2], ..normal(1.5, 0) }));
+        assert!(is_passed(Look { keys: [kinds::BY_COLOR; 2], ..normal(0.5, 0) }));
+    }
+}
