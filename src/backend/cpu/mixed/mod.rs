@@ -15,10 +15,6 @@ mod faces;
 pub(crate) mod find;
 pub(crate) mod lists;
 pub(crate) mod points;
-#[cfg(target_arch = "x86_64")]
-mod points_avx2;
-#[cfg(target_arch = "x86_64")]
-mod points_avx512;
 mod recent;
 mod shares;
 pub(crate) mod thinness;

@@ -3,7 +3,6 @@
 //! Looks are compared, not shown. They are made of numbers that both back-ends have to the bit: colours
 //! that are shaded may differ in their last place.
 
-use super::coarse::CoarseLooks;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::NOTHING;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
@@ -86,7 +85,7 @@ impl Look {
 
     /// The look of a face, or of the outline's triangle, or of nothing.
     #[inline(always)]
-    fn of(context: &RasterContext<'_>, id: u32) -> Self {
+    pub fn of(context: &RasterContext<'_>, id: u32) -> Self {
         if id == NOTHING {
             return Self::NOTHING;
         }
@@ -117,7 +116,7 @@ impl Look {
 
     /// True for faces that only their normal tells from others of their material, the same at all corners.
     #[inline(always)]
-    fn is_of_one_normal(&self) -> bool {
+    pub fn is_of_one_normal(&self) -> bool {
         self.keys[0] >> KIND_SHIFT == kinds::BY_NORMAL >> KIND_SHIFT && self.low == self.high
     }
 
@@ -154,84 +153,9 @@ impl Look {
     }
 }
 
-/// Pairs of faces that were compared last, and the looks that were made last: neighbouring pixels show the same ones.
-pub struct Pairs {
-    steps: [Pair; Pairs::STEPS],
-    /// Id and look of a face.
-    looks: [(u32, Look); Pairs::LOOKS],
-    /// The looks of more faces.
-    pub coarse: CoarseLooks,
-}
-
-#[derive(Clone, Copy)]
-struct Pair {
-    ids: [u32; 2],
-    step: Step,
-}
-
-impl Pairs {
-    const STEPS: usize = 1024;
-    const LOOKS: usize = 512;
-
-    /// None but of nothing and nothing.
-    pub fn new() -> Self {
-        Self {
-            steps: [Pair { ids: [NOTHING; 2], step: Step::None }; Self::STEPS],
-            looks: [(NOTHING, Look::NOTHING); Self::LOOKS],
-            coarse: CoarseLooks::new(),
-        }
-    }
-
-    /// The step of colours from one of two ids to the other.
-    #[inline(always)]
-    pub fn step(&mut self, context: &RasterContext<'_>, a: u32, b: u32) -> Step {
-        if a == b {
-            return Step::None;
-        }
-        let ids = [a.min(b), a.max(b)];
-        let place = ids[0].wrapping_mul(5).wrapping_add(ids[1]) as usize % Self::STEPS;
-        if self.steps[place].ids != ids {
-            if self.coarse.are_alike(ids) {
-                return Step::None;
-            }
-            self.steps[place] = Pair { ids, step: self.new_step(context, ids) };
-        }
-        self.steps[place].step
-    }
-
-    #[inline(never)]
-    fn new_step(&mut self, context: &RasterContext<'_>, [a, b]: [u32; 2]) -> Step {
-        let (of_a, of_b) = (self.look(context, a), self.look(context, b));
-        match of_a.step_to(&of_b) {
-            Step::None => Step::None,
-            // Links cannot lower this step: the normals were compared.
-            step if of_a.is_of_one_normal() && of_b.is_of_one_normal() => step,
-            step => step.min(step_of_linked(context, a, b)),
-        }
-    }
-
-    /// Remembers the look of an id.
-    #[inline(always)]
-    pub fn remember(&mut self, context: &RasterContext<'_>, id: u32) {
-        if id != NOTHING && !self.coarse.has(id) {
-            let look = self.look(context, id);
-            self.coarse.put(id, &look);
-        }
-    }
-
-    #[inline(always)]
-    fn look(&mut self, context: &RasterContext<'_>, id: u32) -> Look {
-        let (of, look) = &mut self.looks[id as usize % Self::LOOKS];
-        if *of != id {
-            (*of, *look) = (id, Look::of(context, id));
-        }
-        *look
-    }
-}
-
 /// The step between two faces of which all but the normal goes on from one to the other; a hard one between others.
 #[inline(always)]
-fn step_of_linked(context: &RasterContext<'_>, a: u32, b: u32) -> Step {
+pub fn step_of_linked(context: &RasterContext<'_>, a: u32, b: u32) -> Step {
     let surface = context.plan.surface.as_ref().filter(|_| are_linked(context, a, b));
     let Some(surface) = surface else { return Step::Hard };
     if surface.material(a as usize).flags & flags::FACE_NORMALS == 0 {

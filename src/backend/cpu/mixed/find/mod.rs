@@ -10,16 +10,16 @@
 
 mod coarse;
 mod differing;
-#[cfg(target_arch = "x86_64")]
-mod differing_avx2;
 pub mod look;
+mod pairs;
 mod pixels;
 pub mod thin;
 
 pub use self::pixels::MixedPixels;
 
 use self::differing::{WORD, find_differing};
-use self::look::{Pairs, Step};
+use self::look::Step;
+use self::pairs::Pairs;
 use self::thin::{mark_thin, may_be_seen};
 use super::band_triangles::BandTriangles;
 use crate::backend::cpu::RasterContext;

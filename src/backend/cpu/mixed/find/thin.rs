@@ -4,7 +4,7 @@
 //! behind it, and colours break off from there to it. That pixel alone is mixed then, and not its neighbours.
 
 use super::breaks;
-use super::look::Pairs;
+use super::pairs::Pairs;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::{BoxedFace, unpair};
 use crate::backend::cpu::geometry::samples::SampleBand;

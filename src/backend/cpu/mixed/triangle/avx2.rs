@@ -1,13 +1,13 @@
-//! Stage mixed: tests of a pixel's points in AVX2 instructions, eight points at a time. Compilers make much longer code
+//! Stage mixed, per triangle and pixel: tests of a pixel's points in AVX2 instructions, eight points at a time. Compilers make much longer code
 //! of "a bit for each sign".
 
 #![allow(unsafe_code)]
 
 use std::arch::x86_64::*;
 
-use super::points::{Lattice, PointSet};
-use super::triangle::Plane;
+use super::Plane;
 use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::mixed::points::{Lattice, PointSet};
 use crate::backend::sample_partition::{GENERATORS, POINTS};
 
 /// Vectors of a word's points.

@@ -3,6 +3,11 @@
 //! Points lie in the middle of 1/256 px, so edge functions are taken in halves of it. The rest is as in
 //! stage visibility: exact signs with the top-left rule, depth from offsets.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+
 use super::points::{Lattice, PLACE_MAX, PointSet};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility::{Setup, area, clamp};
@@ -150,7 +155,7 @@ impl Plane {
         #[cfg(target_arch = "x86_64")]
         if isa.has_avx2() {
             // SAFETY: `has_avx2` is true where the processor has AVX2.
-            return unsafe { super::points_avx2::nearer(self, other, points, wins_ties) };
+            return unsafe { avx2::nearer(self, other, points, wins_ties) };
         }
         let _ = isa;
         points.filter(|i| {
@@ -194,10 +199,10 @@ fn outside<const W: usize>(isa: Isa, edge: Edge) -> PointSet<W> {
     #[cfg(target_arch = "x86_64")]
     if isa.has_avx512() {
         // SAFETY: `has_avx512` is true where the processor has AVX-512F.
-        return unsafe { super::points_avx512::outside(edge) };
+        return unsafe { avx512::outside(edge) };
     } else if isa.has_avx2() {
         // SAFETY: `has_avx2` is true where the processor has AVX2.
-        return unsafe { super::points_avx2::outside(edge) };
+        return unsafe { avx2::outside(edge) };
     }
     let _ = isa;
     outside_plainly(edge)

@@ -1,11 +1,11 @@
-//! Stage mixed: tests of a pixel's points in AVX-512 instructions, sixteen points at a time.
+//! Stage mixed, per triangle and pixel: tests of a pixel's points in AVX-512 instructions, sixteen points at a time.
 
 #![allow(unsafe_code)]
 
 use std::arch::x86_64::*;
 
-use super::points::{Lattice, PointSet};
 use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::mixed::points::{Lattice, PointSet};
 use crate::backend::sample_partition::{GENERATORS, POINTS};
 
 /// Points in a vector.

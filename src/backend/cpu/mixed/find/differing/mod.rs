@@ -1,5 +1,8 @@
 //! Stage mixed, per row: the pixels whose samples show several faces, or another one than the pixel on the left or above.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+
 use crate::backend::cpu::isa::Isa;
 
 /// Ids of a pixel's samples.
@@ -37,7 +40,7 @@ fn word(isa: Isa, own: &[Ids; WORD + 1], above: &[Ids]) -> u64 {
     #[cfg(target_arch = "x86_64")]
     if let (true, Some(above)) = (isa.has_avx2(), above.first_chunk()) {
         // SAFETY: `has_avx2` is true where the processor has AVX2.
-        return unsafe { super::differing_avx2::word(own, above) };
+        return unsafe { avx2::word(own, above) };
     }
     let _ = isa;
     let mut word = 0;

@@ -1,10 +1,10 @@
-//! Stage mixed, per row: steps of `differing` in AVX2 instructions, two pixels in a vector.
+//! Stage mixed, per row: tests of `differing` in AVX2 instructions, two pixels in a vector.
 
 #![allow(unsafe_code)]
 
 use std::arch::x86_64::*;
 
-use super::differing::{Ids, WORD};
+use super::{Ids, WORD};
 
 /// Pixels in a vector.
 const PIXELS: usize = 2;
@@ -12,7 +12,7 @@ const PIXELS: usize = 2;
 /// Vectors whose results make a vector of one number per pixel.
 const VECTORS: usize = 4;
 
-/// As `differing::word`.
+/// As `word`.
 #[inline]
 #[target_feature(enable = "avx2")]
 pub fn word(own: &[Ids; WORD + 1], above: &[Ids; WORD]) -> u64 {

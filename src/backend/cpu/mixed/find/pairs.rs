@@ -1,0 +1,81 @@
+//! Stage mixed, per pair of faces: the step of colours from one to the other, remembered from pixel to pixel.
+
+use super::coarse::CoarseLooks;
+use super::look::{Look, Step, step_of_linked};
+use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::geometry::samples::NOTHING;
+
+/// Pairs of faces that were compared last, and the looks that were made last: neighbouring pixels show the same ones.
+pub struct Pairs {
+    steps: [Pair; Pairs::STEPS],
+    /// Id and look of a face.
+    looks: [(u32, Look); Pairs::LOOKS],
+    /// The looks of more faces.
+    pub coarse: CoarseLooks,
+}
+
+#[derive(Clone, Copy)]
+struct Pair {
+    ids: [u32; 2],
+    step: Step,
+}
+
+impl Pairs {
+    const STEPS: usize = 1024;
+    const LOOKS: usize = 512;
+
+    /// None but of nothing and nothing.
+    pub fn new() -> Self {
+        Self {
+            steps: [Pair { ids: [NOTHING; 2], step: Step::None }; Self::STEPS],
+            looks: [(NOTHING, Look::NOTHING); Self::LOOKS],
+            coarse: CoarseLooks::new(),
+        }
+    }
+
+    /// The step of colours from one of two ids to the other.
+    #[inline(always)]
+    pub fn step(&mut self, context: &RasterContext<'_>, a: u32, b: u32) -> Step {
+        if a == b {
+            return Step::None;
+        }
+        let ids = [a.min(b), a.max(b)];
+        let place = ids[0].wrapping_mul(5).wrapping_add(ids[1]) as usize % Self::STEPS;
+        if self.steps[place].ids != ids {
+            if self.coarse.are_alike(ids) {
+                return Step::None;
+            }
+            self.steps[place] = Pair { ids, step: self.new_step(context, ids) };
+        }
+        self.steps[place].step
+    }
+
+    #[inline(never)]
+    fn new_step(&mut self, context: &RasterContext<'_>, [a, b]: [u32; 2]) -> Step {
+        let (of_a, of_b) = (self.look(context, a), self.look(context, b));
+        match of_a.step_to(&of_b) {
+            Step::None => Step::None,
+            // Links cannot lower this step: the normals were compared.
+            step if of_a.is_of_one_normal() && of_b.is_of_one_normal() => step,
+            step => step.min(step_of_linked(context, a, b)),
+        }
+    }
+
+    /// Remembers the look of an id.
+    #[inline(always)]
+    pub fn remember(&mut self, context: &RasterContext<'_>, id: u32) {
+        if id != NOTHING && !self.coarse.has(id) {
+            let look = self.look(context, id);
+            self.coarse.put(id, &look);
+        }
+    }
+
+    #[inline(always)]
+    fn look(&mut self, context: &RasterContext<'_>, id: u32) -> Look {
+        let (of, look) = &mut self.looks[id as usize % Self::LOOKS];
+        if *of != id {
+            (*of, *look) = (id, Look::of(context, id));
+        }
+        *look
+    }
+}
