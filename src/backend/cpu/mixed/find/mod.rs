@@ -70,10 +70,8 @@ pub struct Finder {
     breaks: [Row; 3],
     /// Of one row: the pixels to be looked at.
     differing: Vec<u64>,
-    /// Of one row.
-    is_mixed: Vec<u8>,
-    /// By pixel of the shown rows: [`breaks::THIN`].
-    thin: Vec<u8>,
+    /// By pixel of the shown rows: 0 for those that are not mixed.
+    marks: Vec<u8>,
 }
 
 impl Finder {
@@ -83,24 +81,21 @@ impl Finder {
         }
         self.differing.clear();
         self.differing.reserve_exact(width.div_ceil(WORD));
-        self.is_mixed.clear();
-        self.is_mixed.resize(width, 0);
-        self.thin.clear();
-        self.thin.reserve_exact(width * rows);
-        self.thin.resize(width * rows, 0);
+        self.marks.clear();
+        self.marks.reserve_exact(width * rows);
+        self.marks.resize(width * rows, 0);
     }
 
     /// Allocated memory, bytes.
     pub fn bytes(&self) -> usize {
         self.breaks.iter().map(Row::bytes).sum::<usize>()
             + self.differing.capacity() * size_of::<u64>()
-            + self.is_mixed.capacity()
-            + self.thin.capacity()
+            + self.marks.capacity()
     }
 
     /// The [`bytes`](Self::bytes) of a band, at most.
     pub const fn bytes_of([width, rows]: [usize; 2]) -> usize {
-        width * rows + 3 * (width + 2) + width + width.div_ceil(WORD) * size_of::<u64>()
+        width * rows + 3 * (width + 2) + width.div_ceil(WORD) * size_of::<u64>()
     }
 }
 
@@ -128,19 +123,7 @@ fn find_kernel(
     mixed.reset(size);
     finder.reset(size);
     let mut pairs = Pairs::new();
-    let mut poll = DeadlinePoll::new(context.deadline);
-    for face in triangles.thin().collect::<Vec<_>>().iter().flat_map(|list| list.iter()) {
-        let looked_at = if may_be_seen(band, face) {
-            mark_thin(context, band, &triangles.get(face.id), &mut pairs, &mut finder.thin)
-        } else {
-            0
-        };
-        // A picture whose deadline has passed is thrown away.
-        if poll.is_expired(looked_at as u64) {
-            return;
-        }
-    }
-    for y in first..end {
+    for (y, marks) in (first..end).zip(finder.marks.chunks_exact_mut(size[0])) {
         for y in y - 1..=y + 1 {
             let row = &mut finder.breaks[y.rem_euclid(3) as usize];
             if row.y != Some(y) {
@@ -148,25 +131,34 @@ fn find_kernel(
                 find_breaks(context, band, y, &mut pairs, (&mut finder.differing, &mut row.values));
             }
         }
-        finder.join(y, (y - first) as usize);
-        mixed.push_row(&finder.is_mixed);
+        join([y - 1, y, y + 1].map(|y| &finder.breaks[y.rem_euclid(3) as usize].values[..]), marks);
+    }
+    let mut poll = DeadlinePoll::new(context.deadline);
+    for face in triangles.thin().collect::<Vec<_>>().iter().flat_map(|list| list.iter()) {
+        let mut looked_at = 0;
+        if may_be_seen(band, face, &finder.marks) {
+            looked_at = mark_thin(context, band, &triangles.get(face.id), &mut pairs, &mut finder.marks);
+        }
+        // A picture whose deadline has passed is thrown away.
+        if poll.is_expired(looked_at as u64) {
+            return;
+        }
+    }
+    for marks in finder.marks.chunks_exact(size[0]) {
+        mixed.push_row(marks);
     }
 }
 
-impl Finder {
-    /// Marks the mixed pixels of a row: those where colours break off in the pixel, in one beside, above or below it,
-    /// or on the way from its first sample to theirs. `row` is its number among the shown ones.
-    #[inline(always)]
-    fn join(&mut self, y: i32, row: usize) {
-        const OWN: u8 = breaks::OWN | breaks::OWN << breaks::HARD;
-        const LEFT: u8 = breaks::LEFT | breaks::LEFT << breaks::HARD;
-        const UPPER: u8 = breaks::UPPER | breaks::UPPER << breaks::HARD;
-        let [above, own, below] = [y - 1, y, y + 1].map(|y| &self.breaks[y.rem_euclid(3) as usize].values[..]);
-        let thin = &self.thin[row * self.is_mixed.len()..];
-        for (x, out) in self.is_mixed.iter_mut().enumerate() {
-            let beside = own[x] & OWN | own[x + 1] | own[x + 2] & (OWN | LEFT);
-            *out = beside | above[x + 1] & OWN | below[x + 1] & (OWN | UPPER) | thin[x];
-        }
+/// Marks the mixed pixels of a row: those where colours break off in the pixel, in one beside, above or below it, or on the
+/// way from its first sample to theirs. Given are the breaks of the row above, of its own and of the one below.
+#[inline(always)]
+fn join([above, own, below]: [&[u8]; 3], marks: &mut [u8]) {
+    const OWN: u8 = breaks::OWN | breaks::OWN << breaks::HARD;
+    const LEFT: u8 = breaks::LEFT | breaks::LEFT << breaks::HARD;
+    const UPPER: u8 = breaks::UPPER | breaks::UPPER << breaks::HARD;
+    for (x, out) in marks.iter_mut().enumerate() {
+        let beside = own[x] & OWN | own[x + 1] | own[x + 2] & (OWN | LEFT);
+        *out = beside | above[x + 1] & OWN | below[x + 1] & (OWN | UPPER);
     }
 }
 

@@ -20,9 +20,9 @@ pub const SLACK: i32 = 4;
 /// Pixels of a box that are few enough to be looked at in advance.
 const FEW: i32 = 16;
 
-/// False for triangles of few pixels that all see the triangle, or what lies in front of it.
+/// False for triangles of few pixels that all see the triangle, or what lies in front of it, or are marked already.
 #[inline(always)]
-pub fn may_be_seen(band: &SampleBand, face: &BoxedFace) -> bool {
+pub fn may_be_seen(band: &SampleBand, face: &BoxedFace, marks: &[u8]) -> bool {
     let [[left, right], [top, bottom]] = [face.columns, face.rows].map(unpair);
     let [left, right] = [left.max(0), right.min(band.size_px[0] as i32 - 1)];
     let [top, bottom] = [top.max(band.shown[0] as i32), bottom.min(band.shown[1] as i32 - 1)];
@@ -31,6 +31,9 @@ pub fn may_be_seen(band: &SampleBand, face: &BoxedFace) -> bool {
     }
     for y in top..=bottom {
         for x in left..=right {
+            if is_hard(marks[index(band, x, y)]) {
+                continue;
+            }
             let (ids, depths) = band.pixel(x, y);
             if is_before(face.depth_max, depths) && !ids.contains(&face.id) {
                 return true;
@@ -38,6 +41,18 @@ pub fn may_be_seen(band: &SampleBand, face: &BoxedFace) -> bool {
         }
     }
     false
+}
+
+/// The index of a pixel of the shown rows in a list of all of them.
+#[inline(always)]
+fn index(band: &SampleBand, x: i32, y: i32) -> usize {
+    (y - band.shown[0] as i32) as usize * band.size_px[0] as usize + x as usize
+}
+
+/// True for pixels that no other mark changes.
+#[inline(always)]
+fn is_hard(mark: u8) -> bool {
+    mark >> breaks::HARD != 0
 }
 
 #[inline(always)]
@@ -59,10 +74,14 @@ pub fn mark_thin(
     // Made for the first pixel in which it may be seen: most thin triangles lie behind others.
     let mut points: Option<PointTriangle> = None;
     let [width, height] = band.size_px.map(|size| size as i32);
-    let (first, mut looked_at) = (band.shown[0] as i32, 0);
+    let mut looked_at = 0;
     for_each_pixel(corners, [width, height], band.shown.map(|row| row as i32), |[x, y]| {
+        looked_at += band.samples as usize;
+        let mark = &mut marks[index(band, x, y)];
+        if is_hard(*mark) {
+            return;
+        }
         let (ids, depths) = band.pixel(x, y);
-        looked_at += ids.len();
         if !is_before(nearest, depths) || ids.contains(id) {
             return;
         }
@@ -77,7 +96,7 @@ pub fn mark_thin(
         for (&seen, _) in ids.iter().zip(depths).filter(|(_, depth)| nearest > **depth) {
             found |= pairs.step(context, seen, *id).breaks(breaks::THIN);
         }
-        marks[(y - first) as usize * width as usize + x as usize] |= found;
+        *mark |= found;
     });
     looked_at
 }
