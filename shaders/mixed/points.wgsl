@@ -1,5 +1,5 @@
 // Stage mixed, per triangle and mixed pixel: the points that the triangle covers, and its depth at each. Twin of
-// src/backend/cpu/mixed/triangle.rs.
+// src/backend/cpu/mixed/triangle/mod.rs.
 
 @group(1) @binding(22) var<storage, read> mixed: array<u32>;
 

@@ -5,8 +5,8 @@ use super::geometry::Geometry;
 use super::peeling::needed_pass;
 use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::normals::working_bytes;
-use crate::scene::{MaterialGroups, Scene};
-use crate::spec::Shading;
+use crate::scene::Scene;
+use crate::spec::{Samples, Shading};
 
 /// Bytes per material: what the shaders read of it, and flags.
 const MATERIAL_BYTES: u64 = 307;
@@ -15,9 +15,12 @@ const MATERIAL_BYTES: u64 = 307;
 const VERTEX_BYTES: u64 = 32;
 
 /// Bytes per triangle: up to four entries in the lists of the picture's bands, each with an id and
-/// vertex indices (or eight ids in lists of tiles), two ids in lists that are not by band, and a
+/// vertex indices, or an id and its box (or eight ids in lists of tiles), two ids in lists that are not by band, and a
 /// colour.
 const LISTED_BYTES: u64 = 4 * 16 + 2 * 4 + 16;
+
+/// Bytes more per triangle where samples are adaptive: up to four entries, with boxes, in the lists of thin triangles.
+const THIN_BYTES: u64 = 4 * 16;
 
 /// Bytes more per triangle where a plan has layers: it may be in the lists of the visibility buffer
 /// and in those of the layers, and each thread notes which triangles are done.
@@ -36,6 +39,7 @@ pub fn spend_plan(scene: &Scene<'_, '_>, geometry: &Geometry<'_>, budget: &mut B
     budget.spend("vertices on screen", vertices, VERTEX_BYTES)?;
     // Two bytes more are the pass mask, and the bits of the side that it shows.
     budget.spend("lists of triangles", triangles, LISTED_BYTES + 2)?;
+    budget.spend("lists of thin triangles", triangles, thin_bytes(scene.spec.image.samples))?;
     if needed_pass(groups).is_some() {
         // Layers are drawn band by band, so what they take per sample is bounded.
         budget.spend("lists of layers", triangles, LAYERED_BYTES)?;
@@ -50,10 +54,18 @@ pub fn spend_plan(scene: &Scene<'_, '_>, geometry: &Geometry<'_>, budget: &mut B
 
 /// Spends what both back-ends will allocate for a hull: as much as for the mesh's own vertices and
 /// triangles.
-pub fn spend_hull(hull: &HullPass<'_>, groups: &MaterialGroups<'_>, budget: &mut Budget) -> Result<(), LimitExceeded> {
+pub fn spend_hull(hull: &HullPass<'_>, scene: &Scene<'_, '_>, budget: &mut Budget) -> Result<(), LimitExceeded> {
     let (vertices, triangles) = (hull.vertices.len() as u64, hull.triangles.len() as u64);
     budget.spend("an outline's vertices on screen", vertices, VERTEX_BYTES)?;
     budget.spend("lists of an outline's triangles", triangles, LISTED_BYTES)?;
-    let layers = if needed_pass(groups).is_some() { LAYERED_BYTES } else { 0 };
+    budget.spend("lists of an outline's thin triangles", triangles, thin_bytes(scene.spec.image.samples))?;
+    let layers = if needed_pass(&scene.groups).is_some() { LAYERED_BYTES } else { 0 };
     budget.spend("lists of an outline's layers", triangles, layers)
+}
+
+fn thin_bytes(samples: Samples) -> u64 {
+    match samples {
+        Samples::Adaptive => THIN_BYTES,
+        Samples::Fixed(_) => 0,
+    }
 }

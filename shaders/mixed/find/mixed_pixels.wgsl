@@ -1,4 +1,4 @@
-// Stage mixed, per pixel: whether it is mixed, and its number among those that are. Twin of MixedPixels::join in
+// Stage mixed, per pixel: whether it is mixed, and its number among those that are. Twin of join in
 // src/backend/cpu/mixed/find/mod.rs. Numbers are in no order; nothing depends on it.
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;

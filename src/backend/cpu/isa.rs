@@ -6,7 +6,7 @@
 //!
 //! The innermost steps of triangles and of lines are an exception: they have a second version in AVX2
 //! instructions, in files called `avx2.rs` or `*_avx2.rs`, and the innermost of all a third one in AVX-512,
-//! `geometry/batch_avx512.rs`.
+//! `geometry/batch_avx512.rs` and `mixed/triangle/avx512.rs`.
 //!
 //! To add an instruction set (NEON): a variant of `Level` under its `cfg`, a list of
 //! features beside [`for_avx2_features`], a constructor that detects all of them, and an arm in

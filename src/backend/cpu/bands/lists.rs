@@ -18,16 +18,16 @@ pub struct KeptFaces {
     pub boxed: Vec<BoxedFace>,
 }
 
-/// A triangle, and what tiles ask for to hide it.
+/// A triangle and its box.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BoxedFace {
     pub id: u32,
-    /// First and last column of pixels that may have samples, as a [`pair`].
+    /// First and last column of pixels that may have samples of it, as a [`pair`].
     pub columns: u32,
     /// The same of rows.
     pub rows: u32,
-    /// Depth of the nearest corner.
+    /// Depth of the nearest corner, which is never NaN.
     pub depth_max: f32,
 }
 
@@ -62,7 +62,7 @@ pub struct BandLists {
     boxed: Vec<BoxedFace>,
     /// Triangles that touch many bands, and which ones.
     tall: Vec<(BoxedFace, u32)>,
-    /// Every triangle's id once, in ascending order.
+    /// Every triangle's id once, in ascending order, for lists of which that is asked.
     pub all: Vec<u32>,
 }
 

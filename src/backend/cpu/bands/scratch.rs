@@ -272,7 +272,10 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::plan::{Faces, LinePass, PeelingPass, Projection, Shown, SurfacePass};
+    use crate::backend::Renderer as _;
+    use crate::backend::cpu::CpuRenderer;
+    use crate::limits::Deadline;
+    use crate::plan::{Faces, LinePass, PeelingPass, Projection, ShadedMaterial, Shown, SurfacePass};
 
     fn plan(size_px: [u32; 2], passes: usize) -> DrawPlan<'static> {
         let zero = [0.0; 4];
@@ -400,6 +403,33 @@ mod tests {
             cases += 1;
         });
         assert!(cases > 100, "{cases}");
+    }
+
+    /// Thousands of slivers that cross each other: pixels of many faces, and long lists.
+    #[test]
+    fn mixed_pixels_take_at_most_what_they_were_said_to() {
+        let mut state = 5_u32;
+        let mut chance = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 23) as f32 - 1.0
+        };
+        let positions: Vec<[f32; 3]> = (0..12_000).map(|_| [chance(), chance(), 0.3 * chance()]).collect();
+        let triangles: Vec<[u32; 3]> = (0..4_000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let mut plan = DrawPlan::new([130, 90], &positions, &triangles, Projection::for_tests());
+        (plan.samples, plan.is_adaptive, plan.margin_px) = (4, true, 1);
+        let materials = [1.0, 0.1].map(|v| ShadedMaterial::unlit([v, v, v, 1.0])).to_vec();
+        let mut surface = SurfacePass::new(Faces::Both, materials);
+        surface.is_shaded = true;
+        surface.triangle_materials = (0..4_000).map(|i| i % 2).collect::<Vec<u32>>().into();
+        plan.surface = Some(surface);
+        let banding = Banding::new(&plan, 1);
+        let mut cpu = CpuRenderer::new(1);
+        cpu.draw(&plan, &Deadline::default()).unwrap();
+        assert!(cpu.draw_times().mixed_pixels > 3_000, "{}", cpu.draw_times().mixed_pixels);
+        let all = cpu.scratch.0.lock().unwrap();
+        let found = all.iter().map(|scratch| scratch.mixed.bytes()).max().unwrap();
+        let most = MixedScratch::bytes_of([plan.width_px as usize, banding.rows as usize]);
+        assert!(found > 1 << 20 && found <= most, "{found} of {most}");
     }
 
     #[test]

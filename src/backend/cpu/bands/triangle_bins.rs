@@ -16,11 +16,11 @@ use crate::plan::Faces;
 pub struct TriangleBin {
     /// The chunk's ids.
     pub ids: Range<usize>,
-    /// Ids of triangles that face the viewer and need no clipping.
+    /// Triangles that face the viewer and need no clipping; with boxes if the picture has mixed pixels.
     pub fronts: BandLists,
-    /// Ids of those that face away.
+    /// Those that face away, with boxes.
     pub backs: BandLists,
-    /// Those of both that are thin, where they are looked for.
+    /// Those of both that are thin, with boxes, if the picture has mixed pixels.
     pub thin: BandLists,
     /// The sides that the chunk's triangles show.
     pub sides: Vec<Sides>,
@@ -51,6 +51,8 @@ impl TriangleBin {
             let Some(faces) = pass.faces_of(plan, id as usize) else { continue };
             bin.push_clipped(context, &bounds, id, faces);
         }
+        // Nobody asks for these.
+        bin.thin.all = Vec::new();
         bin
     }
 

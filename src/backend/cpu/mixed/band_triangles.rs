@@ -18,7 +18,7 @@ pub struct BandTriangles<'a> {
     pieces_before: Vec<u32>,
 }
 
-/// Highest bit of an item that is the number of a clipped piece among those of the picture; other items are ids.
+/// An item names a triangle of a band: it is the triangle's id or, with this bit, the number of a clipped piece.
 const PIECE: u32 = 1 << 31;
 
 /// A triangle, or a piece of one, on screen.
@@ -43,21 +43,17 @@ impl<'a> BandTriangles<'a> {
 
     /// Calls `each` for each triangle until it breaks off.
     pub fn for_each(&self, mut each: impl FnMut(ScreenTriangle) -> ControlFlow<()>) -> ControlFlow<()> {
-        self.boxed().iter().flat_map(|list| list.iter()).try_for_each(|face| each(self.get(face.id)))
+        self.boxed().try_for_each(|list| list.iter().try_for_each(|face| each(self.get(face.id))))
     }
 
-    /// Its triangles, each with the pixels that may have points in it, and with its item in place of its id: first what is
-    /// clipped, then what faces the viewer. What faces away is mostly hidden by then.
-    pub fn boxed(&self) -> Vec<Cow<'a, [BoxedFace]>> {
-        let mut lists = Vec::with_capacity(5 * self.bins.len());
-        for (bin, before) in self.bins.iter().zip(&self.pieces_before) {
+    /// Its triangles, each with the pixels that may have points in it, and with its item in place of its id. Clipped pieces
+    /// come first, then what faces the viewer: what faces away is mostly hidden by then.
+    pub fn boxed(&self) -> impl Iterator<Item = Cow<'a, [BoxedFace]>> {
+        let pieces = self.bins.iter().zip(&self.pieces_before).map(|(bin, before)| {
             let boxed = |i: u32| self.boxed_piece(PIECE | (before + i), bin.piece(i).1);
-            lists.push(Cow::Owned(bin.piece_numbers_in(self.band).map(boxed).collect()));
-        }
-        for list_of in [|bin: &'a TriangleBin| &bin.fronts, |bin: &'a TriangleBin| &bin.backs] {
-            lists.extend(self.boxed_of(list_of));
-        }
-        lists
+            Cow::Owned(bin.piece_numbers_in(self.band).map(boxed).collect())
+        });
+        pieces.chain(self.boxed_of(|bin| &bin.fronts)).chain(self.boxed_of(|bin| &bin.backs))
     }
 
     /// Those that are thin. None of them is clipped.

@@ -154,7 +154,7 @@ impl<const W: usize> Points<W> {
     ) {
         let mut crowd = Crowd::EMPTY;
         let mut poll = DeadlinePoll::new(context.deadline);
-        let mut offer = |ScreenTriangle { id, corners, .. }: ScreenTriangle| {
+        let mut offer = |ScreenTriangle { id, corners }: ScreenTriangle| {
             if let Some(mut triangle) = PointTriangle::new(id, &corners) {
                 crowd.offer(context.isa, &mut triangle, corner);
             }

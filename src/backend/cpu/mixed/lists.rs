@@ -34,7 +34,7 @@ pub struct PixelLists {
 /// A triangle of a list.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Listed {
-    /// Its number among those of the picture, for [`BandTriangles::get`].
+    /// Its item, for [`BandTriangles::get`].
     pub item: u32,
     /// The nearest depth of its corners.
     pub nearest: f32,

@@ -47,7 +47,7 @@ impl Recent {
     pub fn get(&mut self, triangles: &BandTriangles<'_>, item: u32) -> Option<&mut PointTriangle> {
         let place = self.places.get_mut(item as usize % COUNT)?;
         if place.item != item {
-            let ScreenTriangle { id, corners, .. } = triangles.get(item);
+            let ScreenTriangle { id, corners } = triangles.get(item);
             *place = Place { item, triangle: PointTriangle::new(id, &corners) };
         }
         place.triangle.as_mut()

@@ -46,7 +46,7 @@ pub fn hull_pass<'m>(
     cx.short_chains += parts.short_chains;
     let canvas = Canvas { size_px: scene.size_px(), first_vertex: geometry.positions.len() as u32 };
     let mut hull = OutlineMesh::draw(&view, canvas, &parts, cx)?;
-    spend_hull(&hull, groups, cx.budget)?;
+    spend_hull(&hull, scene, cx.budget)?;
     if !needs_materials {
         hull.triangle_materials = Vec::new();
     }

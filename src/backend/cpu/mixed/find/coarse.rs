@@ -1,6 +1,6 @@
 //! Stage mixed, per pixel: a quick test that most pixels pass whose faces look alike.
 //!
-//! Looks are kept in bytes. Where the bytes of several faces lie close together, so do the looks of all pairs of them; where
+//! Looks are kept in bytes. Where the bytes of several faces lie close together, all pairs of these faces look alike. Where
 //! they do not, the looks themselves are compared.
 
 use super::look::{ALIKE, Look, kinds};
@@ -9,33 +9,37 @@ use crate::backend::cpu::geometry::samples::NOTHING;
 /// Faces that are remembered: a power of two.
 const COUNT: usize = 4096;
 
+/// An id that neither a face nor nothing has. So nothing is never remembered, and passes no test.
+const FREE: u32 = NOTHING - 1;
+
 /// Steps of a byte per unit of the square root of a value.
 const STEPS: f32 = 79.0;
 
 /// Largest difference of bytes that tells that values are alike.
 ///
-/// Values a and b are alike if (a - b)^2 <= [`ALIKE`] (a + b). With u and v for their square roots, (a - b)^2 is
-/// (u - v)^2 (u + v)^2, which is at most (u - v)^2 times 2 (a + b). So (u - v)^2 <= [`ALIKE`] / 2 suffices.
+/// Bytes are rounded down, so those of values that differ by this much belong to roots that are less than one step more
+/// apart. Values a and b are alike if (a - b)^2 <= [`ALIKE`] (a + b). With u and v for their square roots, (a - b)^2 is
+/// (u - v)^2 (u + v)^2, which is at most (u - v)^2 times 2 (a + b). So (u - v)^2 <= [`ALIKE`] / 2 suffices, and a hundredth is left for what f32 rounds.
 const ALIKE_STEPS: u8 = 7;
 
 /// Of the ranges of three values and the key: the bits that are 0 where faces are alike.
 const UNLIKE_BITS: u32 = !u32::from_le_bytes([ALIKE_STEPS, ALIKE_STEPS, ALIKE_STEPS, 0]);
 
 const _: () = {
-    // So that no more than the steps have the other bits.
+    // A difference has none of these bits just where it is at most `ALIKE_STEPS`.
     assert!((ALIKE_STEPS + 1).is_power_of_two());
     let difference = (ALIKE_STEPS as f32 + 1.0) / STEPS;
     assert!(difference * difference < ALIKE / 2.0 * 0.99);
 };
 
-/// Key byte of the outline's triangles. Materials have the lower ones.
+/// Key byte of the outline's triangles. Materials below have their index; faces of others never pass.
 const BY_COLOR: u8 = 254;
 
-/// A look in bytes, from the lowest: the smallest three values and the key, then the largest ones and the key, subtracted
-/// from 255.
+/// A look in bytes. The lower four are the smallest of each of three values, and the key. The higher four are 255 less the
+/// largest of each, and 255 less the key. So the smaller bytes of two such numbers are the look of both faces together.
 type Bytes = u64;
 
-/// Bytes of a face that is like no other.
+/// Bytes of a face that is like no other: its values and key range from 0 to 255, together with those of any face.
 const UNLIKE: Bytes = 0;
 
 /// The looks of faces that were looked at last.
@@ -44,10 +48,24 @@ pub struct CoarseLooks {
     looks: Box<[Bytes; COUNT]>,
 }
 
+impl Default for CoarseLooks {
+    fn default() -> Self {
+        Self { ids: Box::new([FREE; COUNT]), looks: Box::new([UNLIKE; COUNT]) }
+    }
+}
+
 impl CoarseLooks {
-    /// None.
-    pub fn new() -> Self {
-        Self { ids: Box::new([NOTHING; COUNT]), looks: Box::new([UNLIKE; COUNT]) }
+    /// Allocated memory, bytes.
+    pub const BYTES: usize = COUNT * (size_of::<u32>() + size_of::<Bytes>());
+
+    /// Allocated memory, bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.ids) + size_of_val(&*self.looks)
+    }
+
+    /// Forgets all faces: another picture has others.
+    pub fn reset(&mut self) {
+        self.ids.fill(FREE);
     }
 
     /// True if the face is remembered.
@@ -60,7 +78,7 @@ impl CoarseLooks {
     #[inline(always)]
     pub fn put(&mut self, id: u32, look: &Look) {
         let place = id as usize % COUNT;
-        (self.ids[place], self.looks[place]) = (id, bytes_of(look));
+        (self.ids[place], self.looks[place]) = (id, in_bytes(look));
     }
 
     /// True only if each pair of some faces looks alike.
@@ -73,7 +91,7 @@ impl CoarseLooks {
             is_known &= self.ids[place] == id;
             least = smallest_bytes(least, self.looks[place]);
         }
-        // No sum of two bytes is more than 255, so they are added side by side.
+        // The smallest value is not above the largest. So no sum of two bytes is more than 255, and none carries.
         let ranges = !(least as u32).wrapping_add((least >> 32) as u32);
         is_known & (ranges & UNLIKE_BITS == 0)
     }
@@ -101,7 +119,7 @@ fn smallest_bytes(a: u64, b: u64) -> u64 {
 }
 
 #[inline(always)]
-fn bytes_of(look: &Look) -> Bytes {
+fn in_bytes(look: &Look) -> Bytes {
     let index = look.keys[0] & !(3 << 30);
     let key = match look.keys[0] & 3 << 30 {
         kinds::BY_NORMAL if index < u32::from(BY_COLOR) => index as u8,
@@ -111,7 +129,7 @@ fn bytes_of(look: &Look) -> Bytes {
     let mut bytes = [key, key, key, key, !key, !key, !key, !key];
     for k in 0..3 {
         let (low, high) = (look.low[k].sqrt() * STEPS, look.high[k].sqrt() * STEPS);
-        // Not a number is not in a range.
+        // No range contains NaN.
         if !(0.0..255.0).contains(&low) || !(0.0..255.0).contains(&high) {
             return UNLIKE;
         }
@@ -125,7 +143,6 @@ mod tests {
     use super::*;
     use crate::backend::cpu::mixed::find::look::{NORMAL_SHIFT, Step};
 
-    /// The looks of faces with normals of up to so many steps from one another, seen by three corners.
     #[test]
     fn faces_that_pass_look_alike() {
         let mut state = 3_u32;
@@ -146,8 +163,15 @@ mod tests {
                     (look.low[k], look.high[k]) = (a[k].min(b[k]), a[k].max(b[k]));
                 }
             }
-            let mut coarse = CoarseLooks::new();
+            let mut coarse = CoarseLooks::default();
             let ids = [round, round + 1, round + 70_000];
+            // Colours of the outline, down to black.
+            if round % 5 == 0 {
+                for look in &mut looks {
+                    let shift = |v: f32| (v - 0.5).max(0.0) * [1.0, 0.1, 0.001][round as usize / 5 % 3];
+                    *look = Look { low: look.low.map(shift), high: look.high.map(shift), keys: [kinds::BY_COLOR; 2] };
+                }
+            }
             for (id, look) in ids.iter().zip(&looks) {
                 coarse.put(*id, look);
             }
@@ -165,7 +189,7 @@ mod tests {
     fn faces_like_no_other_do_not_pass() {
         let normal = |v: f32, material: u32| Look { low: [v; 3], high: [v; 3], keys: [kinds::BY_NORMAL | material; 2] };
         let is_passed = |look: Look| {
-            let mut coarse = CoarseLooks::new();
+            let mut coarse = CoarseLooks::default();
             coarse.put(5, &look);
             coarse.put(6, &look);
             coarse.are_alike([5, 6])
@@ -175,5 +199,18 @@ mod tests {
         assert!(!is_passed(normal(f32::NAN, 0)) && !is_passed(normal(-1.0, 0)) && !is_passed(normal(640.0, 0)));
         assert!(!is_passed(Look { keys: [kinds::UNIQUE | 5; 2], ..normal(1.5, 0) }));
         assert!(is_passed(Look { keys: [kinds::BY_COLOR; 2], ..normal(0.5, 0) }));
+        assert!(is_passed(normal(10.4, 0)) && !is_passed(normal(10.5, 0)), "more than a byte");
+    }
+
+    #[test]
+    fn what_was_remembered_is_forgotten() {
+        let look = Look { low: [1.5; 3], high: [1.5; 3], keys: [kinds::BY_NORMAL; 2] };
+        let mut coarse = CoarseLooks::default();
+        // Where nothing has its place, too.
+        let ids = [NOTHING % COUNT as u32, 7];
+        ids.iter().for_each(|id| coarse.put(*id, &look));
+        assert!(coarse.are_alike(ids) && !coarse.are_alike([ids[1], NOTHING]));
+        coarse.reset();
+        assert!(!coarse.are_alike(ids) && !coarse.are_alike([NOTHING, NOTHING]) && !coarse.has(ids[0]));
     }
 }

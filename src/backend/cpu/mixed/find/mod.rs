@@ -1,4 +1,4 @@
-//! Stage mixed, per pixel: finds the mixed pixels, and knows where they are.
+//! Stage mixed, per pixel: finds the mixed pixels.
 //!
 //! A pixel is mixed if its samples and those of its four neighbours show several faces (or a face and
 //! nothing) and colours break off from one to the next ([`Pairs::step`]). Where an edge goes through a pixel
@@ -17,10 +17,11 @@ pub mod thin;
 
 pub use self::pixels::MixedPixels;
 
+use self::coarse::CoarseLooks;
 use self::differing::{WORD, find_differing};
 use self::look::Step;
 use self::pairs::Pairs;
-use self::thin::{mark_thin, may_be_seen};
+use self::thin::{mark_thin, may_mark};
 use super::band_triangles::BandTriangles;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
@@ -72,6 +73,7 @@ pub struct Finder {
     differing: Vec<u64>,
     /// By pixel of the shown rows: 0 for those that are not mixed.
     marks: Vec<u8>,
+    looks: Option<CoarseLooks>,
 }
 
 impl Finder {
@@ -91,11 +93,12 @@ impl Finder {
         self.breaks.iter().map(Row::bytes).sum::<usize>()
             + self.differing.capacity() * size_of::<u64>()
             + self.marks.capacity()
+            + self.looks.as_ref().map_or(0, CoarseLooks::bytes)
     }
 
     /// The [`bytes`](Self::bytes) of a band, at most.
     pub const fn bytes_of([width, rows]: [usize; 2]) -> usize {
-        width * rows + 3 * (width + 2) + width.div_ceil(WORD) * size_of::<u64>()
+        width * rows + 3 * (width + 2) + width.div_ceil(WORD) * size_of::<u64>() + CoarseLooks::BYTES
     }
 }
 
@@ -122,29 +125,32 @@ fn find_kernel(
     let size = [band.size_px[0] as usize, (end - first) as usize];
     mixed.reset(size);
     finder.reset(size);
-    let mut pairs = Pairs::new();
-    for (y, marks) in (first..end).zip(finder.marks.chunks_exact_mut(size[0])) {
+    let Finder { breaks, differing, marks, looks } = finder;
+    let mut pairs = Pairs::new(looks.get_or_insert_default());
+    for (y, marks) in (first..end).zip(marks.chunks_exact_mut(size[0])) {
         for y in y - 1..=y + 1 {
-            let row = &mut finder.breaks[y.rem_euclid(3) as usize];
+            let row = &mut breaks[y.rem_euclid(3) as usize];
             if row.y != Some(y) {
                 row.y = Some(y);
-                find_breaks(context, band, y, &mut pairs, (&mut finder.differing, &mut row.values));
+                find_breaks(context, band, y, &mut pairs, (&mut *differing, &mut row.values));
             }
         }
-        join([y - 1, y, y + 1].map(|y| &finder.breaks[y.rem_euclid(3) as usize].values[..]), marks);
+        join([y - 1, y, y + 1].map(|y| &breaks[y.rem_euclid(3) as usize].values[..]), marks);
     }
     let mut poll = DeadlinePoll::new(context.deadline);
-    for face in triangles.thin().collect::<Vec<_>>().iter().flat_map(|list| list.iter()) {
-        let mut looked_at = 0;
-        if may_be_seen(band, face, &finder.marks) {
-            looked_at = mark_thin(context, band, &triangles.get(face.id), &mut pairs, &mut finder.marks);
-        }
-        // A picture whose deadline has passed is thrown away.
-        if poll.is_expired(looked_at as u64) {
-            return;
+    for list in triangles.thin() {
+        for face in list.iter() {
+            let mut looked_at = 0;
+            if context.is_plain || may_mark(band, face, marks) {
+                looked_at = mark_thin(context, band, &triangles.get(face.id), &mut pairs, marks);
+            }
+            // A picture whose deadline has passed is thrown away.
+            if poll.is_expired(looked_at as u64) {
+                return;
+            }
         }
     }
-    for marks in finder.marks.chunks_exact(size[0]) {
+    for marks in marks.chunks_exact(size[0]) {
         mixed.push_row(marks);
     }
 }
@@ -168,7 +174,7 @@ fn find_breaks(
     context: &RasterContext<'_>,
     band: &SampleBand,
     y: i32,
-    pairs: &mut Pairs,
+    pairs: &mut Pairs<'_>,
     (differing, out): (&mut Vec<u64>, &mut [u8]),
 ) {
     let width = band.size_px[0] as i32;
@@ -183,6 +189,7 @@ fn find_breaks(
         return;
     };
     out.fill(0);
+    // Some neighbours of these lie beyond the picture.
     for x in [-1, 0, width] {
         out[(x + 1) as usize] = breaks_at(context, band, [x, y], pairs);
     }
@@ -202,14 +209,14 @@ fn find_breaks(
 
 /// The places where colours break off in a pixel, and on the way to it.
 #[inline(always)]
-fn breaks_at(context: &RasterContext<'_>, band: &SampleBand, [x, y]: [i32; 2], pairs: &mut Pairs) -> u8 {
+fn breaks_at(context: &RasterContext<'_>, band: &SampleBand, [x, y]: [i32; 2], pairs: &mut Pairs<'_>) -> u8 {
     let ids_of = |x: i32, y: i32| if band.has(x, y) { band.pixel(x, y).0 } else { &[NOTHING] };
     breaks_of(context, ids_of(x, y), [ids_of(x - 1, y)[0], ids_of(x, y - 1)[0]], pairs)
 }
 
 /// The same, given the ids of the pixel's samples and those of the first sample of the pixel on the left and above.
 #[inline(always)]
-fn breaks_of(context: &RasterContext<'_>, ids: &[u32], [left, upper]: [u32; 2], pairs: &mut Pairs) -> u8 {
+fn breaks_of(context: &RasterContext<'_>, ids: &[u32], [left, upper]: [u32; 2], pairs: &mut Pairs<'_>) -> u8 {
     let mut found = 0;
     for id in ids {
         pairs.remember(context, *id);

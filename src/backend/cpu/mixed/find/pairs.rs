@@ -5,13 +5,19 @@ use super::look::{Look, Step, step_of_linked};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::NOTHING;
 
+/// Pairs that are remembered.
+const STEPS: usize = 1024;
+
+/// Looks that are remembered.
+const LOOKS: usize = 512;
+
 /// Pairs of faces that were compared last, and the looks that were made last: neighbouring pixels show the same ones.
-pub struct Pairs {
-    steps: [Pair; Pairs::STEPS],
+pub struct Pairs<'a> {
+    steps: [Pair; STEPS],
     /// Id and look of a face.
-    looks: [(u32, Look); Pairs::LOOKS],
-    /// The looks of more faces.
-    pub coarse: CoarseLooks,
+    looks: [(u32, Look); LOOKS],
+    /// Looks in bytes, of the faces that samples showed last.
+    pub coarse: &'a mut CoarseLooks,
 }
 
 #[derive(Clone, Copy)]
@@ -20,16 +26,14 @@ struct Pair {
     step: Step,
 }
 
-impl Pairs {
-    const STEPS: usize = 1024;
-    const LOOKS: usize = 512;
-
+impl<'a> Pairs<'a> {
     /// None but of nothing and nothing.
-    pub fn new() -> Self {
+    pub fn new(coarse: &'a mut CoarseLooks) -> Self {
+        coarse.reset();
         Self {
-            steps: [Pair { ids: [NOTHING; 2], step: Step::None }; Self::STEPS],
-            looks: [(NOTHING, Look::NOTHING); Self::LOOKS],
-            coarse: CoarseLooks::new(),
+            steps: [Pair { ids: [NOTHING; 2], step: Step::None }; STEPS],
+            looks: [(NOTHING, Look::NOTHING); LOOKS],
+            coarse,
         }
     }
 
@@ -40,7 +44,7 @@ impl Pairs {
             return Step::None;
         }
         let ids = [a.min(b), a.max(b)];
-        let place = ids[0].wrapping_mul(5).wrapping_add(ids[1]) as usize % Self::STEPS;
+        let place = ids[0].wrapping_mul(5).wrapping_add(ids[1]) as usize % STEPS;
         if self.steps[place].ids != ids {
             if self.coarse.are_alike(ids) {
                 return Step::None;
@@ -61,10 +65,10 @@ impl Pairs {
         }
     }
 
-    /// Remembers the look of an id.
+    /// Remembers the look of an id, unless shortcuts are not taken.
     #[inline(always)]
     pub fn remember(&mut self, context: &RasterContext<'_>, id: u32) {
-        if id != NOTHING && !self.coarse.has(id) {
+        if id != NOTHING && !context.is_plain && !self.coarse.has(id) {
             let look = self.look(context, id);
             self.coarse.put(id, &look);
         }
@@ -72,7 +76,7 @@ impl Pairs {
 
     #[inline(always)]
     fn look(&mut self, context: &RasterContext<'_>, id: u32) -> Look {
-        let (of, look) = &mut self.looks[id as usize % Self::LOOKS];
+        let (of, look) = &mut self.looks[id as usize % LOOKS];
         if *of != id {
             (*of, *look) = (id, Look::of(context, id));
         }

@@ -4,9 +4,7 @@ use std::ops::Range;
 
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::mixed::find::breaks;
-
-/// Columns of a word.
-const WORD: usize = u64::BITS as usize;
+use crate::backend::cpu::mixed::find::differing::WORD;
 
 /// The mixed pixels of a band's shown rows.
 #[derive(Default)]
@@ -15,7 +13,7 @@ pub struct MixedPixels {
     pub columns: Vec<u16>,
     /// True for each that few points are enough for.
     pub needs_few: Vec<bool>,
-    /// Words of a row: one more than its columns fill, or end in.
+    /// Words of a row. The place after the last column has a word, too, which [`numbers_in`](Self::numbers_in) reads.
     words_in_row: usize,
     /// A bit for each mixed pixel, row by row.
     words: Vec<u64>,
@@ -75,8 +73,7 @@ impl MixedPixels {
         }
     }
 
-    /// True if none of the pixels from the first to the last column and row is mixed. Rows are counted from the first shown
-    /// one.
+    /// True if no pixel from the first to the last column and row is mixed. Rows are counted from the first shown one.
     #[inline(always)]
     pub fn are_none_in(&self, [left, right]: [usize; 2], [top, bottom]: [usize; 2]) -> bool {
         let (first, last) = (left / WORD, right / WORD);
@@ -164,8 +161,11 @@ mod tests {
                 for right in left..width {
                     let is_before = |end: usize| want.iter().filter(|(r, x, _)| (*r, *x) < (row, end)).count();
                     assert_eq!(pixels.numbers_in(row, [left, right]), is_before(left)..is_before(right + 1));
-                    let is_in = |(r, x, _): &(usize, usize, bool)| *r <= row && (left..=right).contains(x);
-                    assert_eq!(pixels.are_none_in([left, right], [0, row]), !want.iter().any(is_in));
+                    for top in 0..=row {
+                        let is_in =
+                            |(r, x, _): &(usize, usize, bool)| (top..=row).contains(r) && (left..=right).contains(x);
+                        assert_eq!(pixels.are_none_in([left, right], [top, row]), !want.iter().any(is_in));
+                    }
                 }
             }
             assert!(pixels.bytes() <= MixedPixels::bytes_of([width, 3]));

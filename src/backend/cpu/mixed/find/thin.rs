@@ -20,9 +20,10 @@ pub const SLACK: i32 = 4;
 /// Pixels of a box that are few enough to be looked at in advance.
 const FEW: i32 = 16;
 
-/// False for triangles of few pixels that all see the triangle, or what lies in front of it, or are marked already.
+/// True if a thin triangle may change marks. If its box has few pixels they are looked at: a mark stays as it is where it is
+/// hard already, where a sample sees the triangle, and where all samples see what is nearer.
 #[inline(always)]
-pub fn may_be_seen(band: &SampleBand, face: &BoxedFace, marks: &[u8]) -> bool {
+pub fn may_mark(band: &SampleBand, face: &BoxedFace, marks: &[u8]) -> bool {
     let [[left, right], [top, bottom]] = [face.columns, face.rows].map(unpair);
     let [left, right] = [left.max(0), right.min(band.size_px[0] as i32 - 1)];
     let [top, bottom] = [top.max(band.shown[0] as i32), bottom.min(band.shown[1] as i32 - 1)];
@@ -60,16 +61,17 @@ fn is_before(nearest: f32, depths: &[f32]) -> bool {
     depths.iter().any(|depth| nearest > *depth)
 }
 
-/// Marks the pixels of a band's shown rows in which a thin triangle may be seen. The number of samples that were looked at.
+/// Marks the pixels of a band's shown rows in which a thin triangle may be seen. Returns the number of samples that were
+/// looked at.
 #[inline(never)]
 pub fn mark_thin(
     context: &RasterContext<'_>,
     band: &SampleBand,
     triangle: &ScreenTriangle,
-    pairs: &mut Pairs,
+    pairs: &mut Pairs<'_>,
     marks: &mut [u8],
 ) -> usize {
-    let ScreenTriangle { id, corners, .. } = triangle;
+    let ScreenTriangle { id, corners } = triangle;
     let nearest = corners.iter().map(|v| v.z).fold(0.0, f32::max);
     // Made for the first pixel in which it may be seen: most thin triangles lie behind others.
     let mut points: Option<PointTriangle> = None;

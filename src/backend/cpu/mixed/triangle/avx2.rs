@@ -1,5 +1,4 @@
-//! Stage mixed, per triangle and pixel: tests of a pixel's points in AVX2 instructions, eight points at a time. Compilers make much longer code
-//! of "a bit for each sign".
+//! Stage mixed, per triangle and pixel: tests of a pixel's points in AVX2 instructions, eight points at a time.
 
 #![allow(unsafe_code)]
 
@@ -37,7 +36,7 @@ impl<const W: usize> Steps<W> {
     };
 }
 
-/// As `triangle::outside`.
+/// As `outside` of the parent. Compilers make much longer code of "a bit for each sign".
 #[inline]
 #[target_feature(enable = "avx2")]
 pub fn outside<const W: usize>([c, dx, dy]: [i32; 3]) -> PointSet<W> {

@@ -38,7 +38,7 @@ impl<const W: usize> Steps<W> {
     };
 }
 
-/// As `triangle::outside`.
+/// As `outside` of the parent.
 #[inline]
 #[target_feature(enable = "avx512f")]
 pub fn outside<const W: usize>([c, dx, dy]: [i32; 3]) -> PointSet<W> {

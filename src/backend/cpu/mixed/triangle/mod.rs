@@ -58,11 +58,11 @@ pub struct Outline {
 #[derive(Clone, Copy, Debug)]
 pub struct Plane {
     /// The first point from the triangle's first corner, 1/512 px.
-    pub from: [i32; 2],
+    from: [i32; 2],
     /// As [`Setup::depth`].
-    pub depth: [f32; 3],
+    depth: [f32; 3],
     /// As [`Setup::depth_range`].
-    pub range: [f32; 2],
+    range: [f32; 2],
 }
 
 impl PointTriangle {
