@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::band_triangles::BandTriangles;
 use super::find::MixedPixels;
+use super::spans::Spans;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::{BoxedFace, unpair};
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
@@ -16,6 +17,9 @@ pub const PIXELS_MAX: usize = 4096;
 
 /// Triangles of all lists together, at most.
 const TRIANGLES_MAX: usize = 1 << 18;
+
+/// Columns and rows of a box, less one, from which on the triangle is followed row by row.
+const LARGE: i32 = 2;
 
 /// Lists of triangles by mixed pixel.
 #[derive(Default)]
@@ -74,6 +78,7 @@ impl PixelLists {
     #[inline(always)]
     fn add(
         &mut self,
+        triangles: &BandTriangles<'_>,
         triangle: &BoxedFace,
         pixels: &MixedPixels,
         samples: &SampleBand,
@@ -91,10 +96,28 @@ impl PixelLists {
         if pixels.are_none_in(columns, [(top - first) as usize, (bottom - first) as usize]) {
             return Some(0);
         }
+        let is_large = (right - left >= LARGE) & (bottom - top >= LARGE);
+        // Not in a closure, which would be compiled for the baseline.
+        let spans = match is_large {
+            true => Some(Spans::new(&triangles.get(triangle.id).corners, samples.size_px)),
+            false => None,
+        };
         let before = self.pairs.len();
         let listed = Listed { item: triangle.id, nearest: triangle.depth_max };
         for y in top..=bottom {
-            let numbers = pixels.numbers_in((y - first) as usize, columns);
+            let row = (y - first) as usize;
+            let mut numbers = pixels.numbers_in(row, columns);
+            if numbers.is_empty() {
+                continue;
+            }
+            if let Some(spans) = &spans {
+                let [from, to] = spans.columns(y);
+                let [from, to] = [from.max(left), to.min(right)];
+                if from > to {
+                    continue;
+                }
+                numbers = pixels.numbers_in(row, [from as usize, to as usize]);
+            }
             let (from, to) = (numbers.start.max(self.pixels.start), numbers.end.min(self.pixels.end));
             if from >= to {
                 continue;
@@ -164,7 +187,7 @@ fn fill_kernel(
     let mut poll = DeadlinePoll::new(context.deadline);
     'all: for list in triangles.boxed() {
         for triangle in list.iter() {
-            let Some(added) = lists.add(triangle, pixels, samples, rows) else {
+            let Some(added) = lists.add(triangles, triangle, pixels, samples, rows) else {
                 lists.end = ListsEnd::Full;
                 break 'all;
             };

@@ -17,5 +17,6 @@ pub(crate) mod lists;
 pub(crate) mod points;
 mod recent;
 mod shares;
+mod spans;
 pub(crate) mod thinness;
 pub(crate) mod triangle;
