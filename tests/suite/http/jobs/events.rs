@@ -126,7 +126,7 @@ fn failed_and_cancelled_jobs_end_their_streams() {
 #[test]
 fn streams_are_few_and_one_that_goes_away_frees_its_place() {
     let server = Server::start(&["--workers", "1"]);
-    let blockers = [0; 6].map(|_| submit(&server, "size=4096&samples=16"));
+    let blockers = [0; 24].map(|_| submit(&server, "size=4096&samples=16"));
     let job = submit(&server, "size=64");
     let mut streams: Vec<TcpStream> = (0..32).map(|_| follow(&server, &job)).collect();
     let full = server.get(&format!("{job}/events"));
