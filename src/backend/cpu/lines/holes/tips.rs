@@ -33,20 +33,27 @@ impl TipRange {
     /// Marks the pixels around a face's tips: they get strokes.
     #[inline(always)]
     pub fn mark(&self, context: &RasterContext<'_>, band: &SampleBand, id: u32, holes: &mut Holes) {
-        let corners = context.screen_triangle(id);
-        for corner in &corners {
+        for (vertex, corner) in context.triangle(id).into_iter().zip(&context.screen_triangle(id)) {
             let [x, y] = [corner.x + self.half[0], corner.y + self.half[1]].map(|v| v >> 8);
             let [columns, rows] = self.looked_at;
             if x < columns[0] || x >= columns[1] || y < rows[0] || y >= rows[1] {
                 continue;
             }
             let ids = band.pixel(x, y).0;
-            // Most corners are seen, or hidden by all that is seen.
-            if !ids.contains(&id) && is_before_some_around(band, corner, [x, y]) && is_tip(context, ids, corner) {
+            // Most corners are seen, or those of what is seen, or hidden by all that is seen.
+            let is_known = ids.contains(&id) || ids.iter().any(|&other| is_no_face_or_has(context, other, vertex));
+            if !is_known && is_before_some_around(band, corner, [x, y]) && is_tip(context, ids, corner) {
                 holes.mark_around([x, y], self.reach, MARKED | STROKED);
             }
         }
     }
+}
+
+/// True if an id is none of a face, or that of a face with this corner: no tip is in front of those.
+#[inline(always)]
+fn is_no_face_or_has(context: &RasterContext<'_>, id: u32, vertex: u32) -> bool {
+    let Some([a, b, c]) = context.plan.triangles.get(id as usize) else { return true };
+    (*a == vertex) | (*b == vertex) | (*c == vertex)
 }
 
 /// True if a corner is in front of all faces that its pixel shows, and on screen inside one of them.
