@@ -46,11 +46,11 @@ impl<'a> BandTriangles<'a> {
         self.boxed().try_for_each(|list| list.iter().try_for_each(|face| each(self.get(face.id))))
     }
 
-    /// Its triangles, each with the pixels that may have points in it, and with its item in place of its id. Clipped pieces
-    /// come first, then what faces the viewer: what faces away is mostly hidden by then.
+    /// Its triangles, each with the pixels that may have points in it, and with its item in place of its id. Clipped
+    /// pieces come first, then what faces the viewer: what faces away is mostly hidden by then.
     pub fn boxed(&self) -> impl Iterator<Item = Cow<'a, [BoxedFace]>> {
         let pieces = self.bins.iter().zip(&self.pieces_before).map(|(bin, before)| {
-            let boxed = |i: u32| self.boxed_piece(PIECE | (before + i), bin.piece(i).1);
+            let boxed = |i: u32| self.with_box(PIECE | (before + i), bin.piece(i).1);
             Cow::Owned(bin.piece_numbers_in(self.band).map(boxed).collect())
         });
         pieces.chain(self.boxed_of(|bin| &bin.fronts)).chain(self.boxed_of(|bin| &bin.backs))
@@ -64,11 +64,16 @@ impl<'a> BandTriangles<'a> {
     fn boxed_of(&self, list_of: fn(&'a TriangleBin) -> &'a BandLists) -> impl Iterator<Item = Cow<'a, [BoxedFace]>> {
         self.bins.iter().flat_map(move |bin| {
             let (listed, others) = list_of(bin).boxed_in(self.band);
+            if self.context.is_plain {
+                // Boxes that culling has no part in.
+                let boxed = |face: &BoxedFace| self.with_box(face.id, &self.get(face.id).corners);
+                return [listed, &others].map(|faces| Cow::Owned(faces.iter().map(boxed).collect()));
+            }
             [Cow::Borrowed(listed), Cow::Owned(others)]
         })
     }
 
-    fn boxed_piece(&self, item: u32, corners: &[ScreenVertex; 3]) -> BoxedFace {
+    fn with_box(&self, item: u32, corners: &[ScreenVertex; 3]) -> BoxedFace {
         let plan = self.context.plan;
         let pixels = |of: fn(&ScreenVertex) -> i32, size: u32| {
             let [a, b, c] = corners.each_ref().map(|v| of(v) + 128 * size as i32);

@@ -83,6 +83,7 @@ impl PixelLists {
         pixels: &MixedPixels,
         samples: &SampleBand,
         rows: [i32; 2],
+        is_plain: bool,
     ) -> Option<usize> {
         let width = samples.size_px[0] as i32;
         let [[left, right], [top, bottom]] = [triangle.columns, triangle.rows].map(unpair);
@@ -96,7 +97,7 @@ impl PixelLists {
         if pixels.are_none_in(columns, [(top - first) as usize, (bottom - first) as usize]) {
             return Some(0);
         }
-        let is_large = (right - left >= LARGE) & (bottom - top >= LARGE);
+        let is_large = !is_plain & (right - left >= LARGE) & (bottom - top >= LARGE);
         // Not in a closure, which would be compiled for the baseline.
         let spans = match is_large {
             true => Some(Spans::new(&triangles.get(triangle.id).corners, samples.size_px)),
@@ -187,7 +188,7 @@ fn fill_kernel(
     let mut poll = DeadlinePoll::new(context.deadline);
     'all: for list in triangles.boxed() {
         for triangle in list.iter() {
-            let Some(added) = lists.add(triangles, triangle, pixels, samples, rows) else {
+            let Some(added) = lists.add(triangles, triangle, pixels, samples, rows, context.is_plain) else {
                 lists.end = ListsEnd::Full;
                 break 'all;
             };

@@ -67,7 +67,8 @@ impl TrianglePass {
 /// The rectangle of the picture that has samples, and its bands.
 pub struct Bounds {
     pub grid: SampleGrid,
-    /// True for pictures with mixed pixels. Thin triangles are listed then, and triangles that face the viewer have boxes.
+    /// True for pictures with mixed pixels. Thin triangles are listed then, and triangles that face the viewer have
+    /// boxes.
     pub has_mixed: bool,
     /// The picture's centre, 1/256 px from its corner.
     pub half: [i32; 2],

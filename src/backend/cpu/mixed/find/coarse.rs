@@ -1,7 +1,7 @@
 //! Stage mixed, per pixel: a quick test that most pixels pass whose faces look alike.
 //!
-//! Looks are kept in bytes. Where the bytes of several faces lie close together, all pairs of these faces look alike. Where
-//! they do not, the looks themselves are compared.
+//! Looks are kept in bytes. Where the bytes of several faces lie close together, all pairs of these faces look alike.
+//! Where they do not, the looks themselves are compared.
 
 use super::look::{ALIKE, Look, kinds};
 use crate::backend::cpu::geometry::samples::NOTHING;
@@ -9,7 +9,8 @@ use crate::backend::cpu::geometry::samples::NOTHING;
 /// Faces that are remembered: a power of two.
 const COUNT: usize = 4096;
 
-/// An id that neither a face nor nothing has. So nothing is never remembered, and passes no test.
+/// The id in a place that no face has taken. [`NOTHING`] is never remembered, so pixels that show the background do not
+/// pass.
 const FREE: u32 = NOTHING - 1;
 
 /// Steps of a byte per unit of the square root of a value.
@@ -17,9 +18,9 @@ const STEPS: f32 = 79.0;
 
 /// Largest difference of bytes that tells that values are alike.
 ///
-/// Bytes are rounded down, so those of values that differ by this much belong to roots that are less than one step more
-/// apart. Values a and b are alike if (a - b)^2 <= [`ALIKE`] (a + b). With u and v for their square roots, (a - b)^2 is
-/// (u - v)^2 (u + v)^2, which is at most (u - v)^2 times 2 (a + b). So (u - v)^2 <= [`ALIKE`] / 2 suffices, and a hundredth is left for what f32 rounds.
+/// Values a and b are alike if (a - b)^2 <= [`ALIKE`] (a + b). With u and v for their square roots, (a - b)^2 is
+/// (u - v)^2 (u + v)^2, which is at most (u - v)^2 times 2 (a + b). So (u - v)^2 <= [`ALIKE`] / 2 suffices. Bytes are
+/// rounded down: where they differ by 7 steps, u and v differ by less than 8. A hundredth is left for what f32 rounds.
 const ALIKE_STEPS: u8 = 7;
 
 /// Of the ranges of three values and the key: the bits that are 0 where faces are alike.
@@ -35,8 +36,9 @@ const _: () = {
 /// Key byte of the outline's triangles. Materials below have their index; faces of others never pass.
 const BY_COLOR: u8 = 254;
 
-/// A look in bytes. The lower four are the smallest of each of three values, and the key. The higher four are 255 less the
-/// largest of each, and 255 less the key. So the smaller bytes of two such numbers are the look of both faces together.
+/// A look in bytes. The lower four are the smallest of each of three values, and the key. The higher four are 255 less
+/// the largest of each, and 255 less the key. So the smaller bytes of two such numbers are the look of both faces
+/// together.
 type Bytes = u64;
 
 /// Bytes of a face that is like no other: its values and key range from 0 to 255, together with those of any face.
@@ -57,11 +59,6 @@ impl Default for CoarseLooks {
 impl CoarseLooks {
     /// Allocated memory, bytes.
     pub const BYTES: usize = COUNT * (size_of::<u32>() + size_of::<Bytes>());
-
-    /// Allocated memory, bytes.
-    pub fn bytes(&self) -> usize {
-        size_of_val(&*self.ids) + size_of_val(&*self.looks)
-    }
 
     /// Forgets all faces: another picture has others.
     pub fn reset(&mut self) {

@@ -93,7 +93,7 @@ impl Finder {
         self.breaks.iter().map(Row::bytes).sum::<usize>()
             + self.differing.capacity() * size_of::<u64>()
             + self.marks.capacity()
-            + self.looks.as_ref().map_or(0, CoarseLooks::bytes)
+            + self.looks.as_ref().map_or(0, |_| CoarseLooks::BYTES)
     }
 
     /// The [`bytes`](Self::bytes) of a band, at most.
@@ -155,8 +155,8 @@ fn find_kernel(
     }
 }
 
-/// Marks the mixed pixels of a row: those where colours break off in the pixel, in one beside, above or below it, or on the
-/// way from its first sample to theirs. Given are the breaks of the row above, of its own and of the one below.
+/// Marks the mixed pixels of a row: those where colours break off in the pixel, in one beside, above or below it, or on
+/// the way from its first sample to theirs. Given are the breaks of the row above, of its own and of the one below.
 #[inline(always)]
 fn join([above, own, below]: [&[u8]; 3], marks: &mut [u8]) {
     const OWN: u8 = breaks::OWN | breaks::OWN << breaks::HARD;

@@ -20,8 +20,8 @@ pub const SLACK: i32 = 4;
 /// Pixels of a box that are few enough to be looked at in advance.
 const FEW: i32 = 16;
 
-/// True if a thin triangle may change marks. If its box has few pixels they are looked at: a mark stays as it is where it is
-/// hard already, where a sample sees the triangle, and where all samples see what is nearer.
+/// True if a thin triangle may change marks. If its box has few pixels they are looked at: a mark stays as it is where it
+/// is hard already, where a sample sees the triangle, and where all samples see what is nearer.
 #[inline(always)]
 pub fn may_mark(band: &SampleBand, face: &BoxedFace, marks: &[u8]) -> bool {
     let [[left, right], [top, bottom]] = [face.columns, face.rows].map(unpair);
@@ -50,7 +50,7 @@ fn index(band: &SampleBand, x: i32, y: i32) -> usize {
     (y - band.shown[0] as i32) as usize * band.size_px[0] as usize + x as usize
 }
 
-/// True for pixels that no other mark changes.
+/// True for the mark of a pixel that has all points already: others do not change it.
 #[inline(always)]
 fn is_hard(mark: u8) -> bool {
     mark >> breaks::HARD != 0
@@ -61,8 +61,8 @@ fn is_before(nearest: f32, depths: &[f32]) -> bool {
     depths.iter().any(|depth| nearest > *depth)
 }
 
-/// Marks the pixels of a band's shown rows in which a thin triangle may be seen. Returns the number of samples that were
-/// looked at.
+/// Marks the pixels of a band's shown rows in which a thin triangle may be seen. Returns the number of samples that
+/// were looked at.
 #[inline(never)]
 pub fn mark_thin(
     context: &RasterContext<'_>,

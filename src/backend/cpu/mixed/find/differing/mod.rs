@@ -1,4 +1,5 @@
-//! Stage mixed, per row: the pixels whose samples show several faces, or another face than the pixel on the left or above.
+//! Stage mixed, per row: the pixels whose samples show several faces, or another face than the pixel on the left or
+//! above.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -11,8 +12,8 @@ pub type Ids = [u32; 4];
 /// Pixels of a word.
 pub const WORD: usize = u64::BITS as usize;
 
-/// Sets a bit of `words` for each such pixel of a row, given the row above. The first pixel is not compared with one on its
-/// left.
+/// Sets a bit of `words` for each such pixel of a row, given the row above. The first pixel is not compared with one on
+/// its left.
 #[inline(always)]
 pub fn find_differing(isa: Isa, own: &[Ids], above: &[Ids], words: &mut Vec<u64>) {
     words.clear();
