@@ -98,14 +98,14 @@ fn keys<'a>(shape: &Shape, more: &[(&'a str, &'a str)]) -> Vec<(&'a str, &'a str
 struct Asked {
     method: &'static str,
     unit: &'static str,
-    samples: u32,
+    samples: &'static str,
     /// The share of its width outside of the shape.
     outside: f64,
     around: Around,
 }
 
 /// A hull in pixels.
-const HULL: Asked = Asked { method: "hull", unit: "px", samples: 16, outside: 1.0, around: Around::Contour };
+const HULL: Asked = Asked { method: "hull", unit: "px", samples: "16", outside: 1.0, around: Around::Contour };
 
 /// Draws every shape's outline in these widths and compares.
 fn measure(asked: Asked, widths: &[f64], gate: impl Fn(f64) -> Gate) {
@@ -114,7 +114,7 @@ fn measure(asked: Asked, widths: &[f64], gate: impl Fn(f64) -> Gate) {
     let [mut mean, mut p99] = [0.0_f64; 2];
     let mut renderer = CpuRenderer::new(2);
     let in_units = asked.unit == "object";
-    let samples = asked.samples.to_string();
+    let samples = asked.samples;
     for shape in &SHAPES {
         let mesh = scenes::mesh(&(shape.obj)());
         let bare = scenes::plan(&mesh, &scenes::spec(&keys(shape, &[("style", "unlit")])));
@@ -126,7 +126,7 @@ fn measure(asked: Asked, widths: &[f64], gate: impl Fn(f64) -> Gate) {
             let mut own = in_units.then(|| Shadow::new(&flat, asked.around, width));
             let thickness = if in_units { units(&mesh, &bare.projection, px) } else { px }.to_string();
             let outline = [("outline.method", asked.method), ("outline.unit", asked.unit), ("style", "outline")];
-            let more = [("outline.thickness", thickness.as_str()), ("samples", &samples)];
+            let more = [("outline.thickness", thickness.as_str()), ("samples", samples)];
             let plan = scenes::plan(&mesh, &scenes::spec(&keys(shape, &[&outline[..], &more].concat())));
             assert_eq!(plan.projection.x, bare.projection.x, "{}: another view", shape.name);
             let covered = alpha(&renderer.draw(&plan, &Deadline::default()).unwrap());
@@ -162,19 +162,21 @@ fn units(mesh: &Mesh, projection: &Projection, px: f64) -> f64 {
 
 #[test]
 fn contours_are_as_wide_as_they_should_be() {
-    let contour = Asked { method: "contour", samples: 4, outside: 0.5, ..HULL };
+    let contour = Asked { method: "contour", samples: "4", outside: 0.5, ..HULL };
     measure(contour, &WIDTHS_PX, |_| GOAL);
     // Where the line is as narrow as a pixel, the surface beside it is as its samples have it.
-    for samples in [8, 16] {
+    for samples in ["8", "16"] {
         measure(Asked { samples, ..contour }, &WIDTHS_PX[..1], |_| GOAL);
     }
 }
 
 #[test]
 fn hulls_are_as_wide_as_they_should_be() {
-    measure(Asked { samples: 4, ..HULL }, &WIDTHS_PX, |_| FOUR_SAMPLES);
-    measure(Asked { samples: 8, ..HULL }, &WIDTHS_PX, |_| GOAL);
+    measure(Asked { samples: "4", ..HULL }, &WIDTHS_PX, |_| FOUR_SAMPLES);
+    measure(Asked { samples: "8", ..HULL }, &WIDTHS_PX, |_| GOAL);
     measure(HULL, &WIDTHS_PX, |_| GOAL);
+    // As near as contours.
+    measure(Asked { samples: "adaptive", ..HULL }, &WIDTHS_PX, |_| Gate { p99_px: 0.05, ..GOAL });
 }
 
 #[test]

@@ -328,12 +328,17 @@ fn pixel_by_point<const S: usize>(context: &RasterContext<'_>, band: &SampleBand
 #[allow(unsafe_code)]
 fn are_means_known<const S: usize>(isa: Isa, flat: &FlatColors, pixels: &[[u32; S]], out: &mut [[f32; 4]]) -> bool {
     #[cfg(target_arch = "x86_64")]
-    if let (true, Some(ids), Some(out)) =
-        (isa.has_avx2(), pixels.as_flattened().as_chunks().0.first_chunk(), out.first_chunk_mut())
-        && S == 4
-    {
+    if isa.has_avx2() && S == 4 {
+        let (ids, _) = pixels.as_flattened().as_chunks();
+        if let (Some(ids), Some(out)) = (ids.first_chunk(), out.first_chunk_mut()) {
+            // SAFETY: the processor has AVX2, as `isa` says.
+            return unsafe { super::flat_avx2::means(&flat.colors, ids, out) };
+        }
+    }
+    #[cfg(target_arch = "x86_64")]
+    if isa.has_avx2() && S.is_multiple_of(LANES) {
         // SAFETY: the processor has AVX2, as `isa` says.
-        return unsafe { super::flat_avx2::means(&flat.colors, ids, out) };
+        return unsafe { super::flat_avx2::means_of_many(&flat.colors, pixels, out) };
     }
     let _ = (isa, flat, pixels, out);
     false
@@ -343,36 +348,84 @@ fn are_means_known<const S: usize>(isa: Isa, flat: &FlatColors, pixels: &[[u32; 
 /// as [`Shader`] does.
 #[inline(always)]
 fn mean<const S: usize>(flat: &FlatColors, ids: &[u32; S]) -> [f32; 4] {
-    let weights = weights(ids);
     let mut sum = [0.0; 4];
-    for s in 0..S {
-        let color = flat.of(ids[s]);
+    let mut left = u32::MAX >> (u32::BITS - S as u32);
+    while left != 0 {
+        let id = ids[left.trailing_zeros() as usize % S];
+        let mut same = 0;
+        for s in 0..S {
+            same |= u32::from(ids[s] == id) << s;
+        }
+        left &= !same;
+        let (weight, color) = (same.count_ones() as f32 * (1.0 / S as f32), flat.of(id));
         for k in 0..4 {
-            sum[k] += weights[s] * color[k];
+            sum[k] += weight * color[k];
         }
     }
     sum
 }
 
-/// Each triangle's share of the samples at its first sample, 0 at the others.
-#[inline(always)]
-fn weights<const S: usize>(ids: &[u32; S]) -> [f32; S] {
-    let (mut counts, mut is_later) = ([0_i32; S], [0_i32; S]);
-    for s in 0..S {
-        let mut same = [0_i32; S];
-        for t in 0..S {
-            same[t] = -i32::from(ids[s] == ids[t]);
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sums share by share, in the order of first samples.
+    fn plain_mean<const S: usize>(colors: &[[f32; 4]], ids: &[u32; S]) -> [f32; 4] {
+        let mut sum = [0.0; 4];
+        for (s, id) in ids.iter().enumerate() {
+            if ids[..s].contains(id) {
+                continue;
+            }
+            let weight = ids.iter().filter(|other| *other == id).count() as f32 / S as f32;
+            let color = colors[(*id as usize).min(colors.len() - 1)];
+            for k in 0..4 {
+                sum[k] += weight * color[k];
+            }
         }
-        for t in 0..S {
-            counts[t] -= same[t];
+        sum
+    }
+
+    /// Compares the means of groups of pixels on an instruction set; how many were known at once.
+    fn means_of<const S: usize>(isa: Isa) -> usize {
+        let mut state = 5_u32;
+        let mut below = |end: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) % end
+        };
+        let colors = (0..20).map(|_| [0; 4].map(|_| below(1000) as f32 / 999.0 - 0.1)).collect();
+        let mut flat = FlatColors { colors };
+        flat.colors[7] = UNKNOWN;
+        flat.colors[19] = [0.0; 4];
+        let mut known = 0;
+        for round in 0..400 {
+            let faces = 1 + round % 7;
+            let pixels: Vec<[u32; S]> =
+                (0..LANES).map(|_| [0; S].map(|_| [4, 9, 12, 5, 6, u32::MAX, 7][below(faces) as usize])).collect();
+            let want: Vec<_> = pixels.iter().map(|ids| plain_mean(&flat.colors, ids)).collect();
+            let mut found = vec![[0.0; 4]; LANES];
+            let are_known = are_means_known(isa, &flat, &pixels, &mut found);
+            let has_unknown = pixels.as_flattened().contains(&7);
+            assert!(!(are_known && has_unknown));
+            assert!(isa == Isa::baseline() || S == 1 || are_known != has_unknown, "{S} samples");
+            for (ids, (want, found)) in pixels.iter().zip(want.iter().zip(&found)) {
+                let bits = |color: &[f32; 4]| color.map(f32::to_bits);
+                assert_eq!(mean(&flat, ids)[3].is_nan(), ids.contains(&7));
+                if !ids.contains(&7) {
+                    assert_eq!(bits(&mean(&flat, ids)), bits(want), "{ids:?}");
+                }
+                assert!(!are_known || bits(found) == bits(want), "{ids:?}");
+            }
+            known += usize::from(are_known);
         }
-        for t in s + 1..S {
-            is_later[t] |= same[t];
+        known
+    }
+
+    #[test]
+    fn every_instruction_set_has_the_same_means() {
+        for isa in Isa::available() {
+            let known = [means_of::<1>(isa), means_of::<4>(isa), means_of::<8>(isa), means_of::<16>(isa)];
+            let at_once = |known: usize| (known > 300) == (isa != Isa::baseline());
+            assert!(known[1..].iter().all(|known| at_once(*known)), "{known:?}");
         }
     }
-    let mut weights = [0.0; S];
-    for s in 0..S {
-        weights[s] = (counts[s] & !is_later[s]) as f32 * (1.0 / S as f32);
-    }
-    weights
 }

@@ -1,5 +1,5 @@
-//! Stage shade: steps of `flat` in AVX2 instructions, lane for lane the same; means for 4 samples per
-//! pixel. Compilers make branches and single lanes of the loops there.
+//! Stage shade: steps of `flat` in AVX2 instructions, lane for lane the same. Compilers make
+//! branches and single lanes of the loops there.
 
 #![allow(unsafe_code)]
 
@@ -8,7 +8,7 @@ use std::arch::x86_64::*;
 use crate::backend::cpu::geometry::batch_avx2::transposed;
 use crate::backend::cpu::isa::LANES;
 
-/// Samples per pixel.
+/// Samples per pixel, of [`means`].
 const SAMPLES: usize = 4;
 
 /// Pixels in a vector of ids.
@@ -42,6 +42,46 @@ pub fn means(colors: &[[f32; 4]], ids: &[[u32; SAMPLES]; LANES], out: &mut [[f32
         unsafe { _mm256_storeu_ps(out.as_mut_ptr().cast(), sum) };
     }
     _mm256_testz_ps(unknown, unknown) != 0
+}
+
+/// As `mean` of each pixel, given the ids of its samples: a multiple of [`LANES`], at most 32. True if no colour is
+/// unknown.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub fn means_of_many<const S: usize>(colors: &[[f32; 4]], pixels: &[[u32; S]], out: &mut [[f32; 4]]) -> bool {
+    const { assert!(S <= u32::BITS as usize) };
+    let Some(last) = colors.len().checked_sub(1) else { return false };
+    let mut unknown = _mm_setzero_ps();
+    for (ids, out) in pixels.iter().zip(out) {
+        let (mut sum, mut left) = (_mm_setzero_ps(), u32::MAX >> (u32::BITS - S as u32));
+        while left != 0 {
+            let id = ids[left.trailing_zeros() as usize % S];
+            let same = same_as(id, ids);
+            left &= (left - 1) & !same;
+            let weight = _mm_set1_ps(same.count_ones() as f32 * (1.0 / S as f32));
+            // SAFETY: a colour has the size of a vector, and the load needs no alignment.
+            let color = unsafe { _mm_loadu_ps(colors[(id as usize).min(last)].as_ptr()) };
+            sum = _mm_add_ps(sum, _mm_mul_ps(weight, color));
+        }
+        unknown = _mm_or_ps(unknown, _mm_cmpunord_ps(sum, sum));
+        // SAFETY: as above, for a store.
+        unsafe { _mm_storeu_ps(out.as_mut_ptr(), sum) };
+    }
+    _mm_movemask_ps(unknown) == 0
+}
+
+/// A bit for each sample that has this id.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn same_as<const S: usize>(id: u32, ids: &[u32; S]) -> u32 {
+    let own = _mm256_set1_epi32(id as i32);
+    let mut same = 0;
+    for (i, ids) in ids.as_chunks::<LANES>().0.iter().enumerate() {
+        // SAFETY: the array has the size of a vector, and the load needs no alignment.
+        let is_same = _mm256_cmpeq_epi32(own, unsafe { _mm256_loadu_si256(ids.as_ptr().cast()) });
+        same |= (_mm256_movemask_ps(_mm256_castsi256_ps(is_same)) as u32) << (LANES * i);
+    }
+    same
 }
 
 /// Normals of triangles, turned to the viewer; None if some id is not below the last normal's.
