@@ -8,7 +8,7 @@ use super::skips::SkipKind;
 use super::{DrawPlan, HullPass, PlanError, pass_mask};
 use super::{costs, ground, heat, lines, margin, outline, primitives, surface};
 use crate::limits::{Budget, Deadline};
-use crate::scene::Scene;
+use crate::scene::{Fill, Scene};
 
 /// Decides what is drawn.
 pub fn build<'m>(scene: &Scene<'m, '_>, budget: &mut Budget, deadline: &Deadline) -> Result<DrawPlan<'m>, PlanError> {
@@ -48,9 +48,9 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
     let occlusion = surface::occlusion::occlusion_pass(scene, surface.as_ref(), &mut cx);
     let clipped = Projection::new(camera, scene.size_px(), true);
     let hides = surface.is_some() || groups.has_hull();
-    let is_peeled = needed_pass(groups).is_some();
     let has_faces = groups.has_hull() || surface.as_ref().is_some_and(|surface| surface.is_shaded);
-    let shown = surface::adaptive::Shown { faces: has_faces, layers: is_peeled };
+    let is_opaque = groups.fills().contains(&Fill::Opaque);
+    let shown = surface::adaptive::Shown { faces: has_faces, is_opaque, layers: needed_pass(groups) };
     let (samples, is_adaptive) = surface::adaptive::samples(scene, shown, &mut cx);
     let needed_px = lines.iter().map(lines::LinePass::margin_rows).filter(|_| hides).max();
     let needed_px = needed_px.unwrap_or(0).max(u32::from(is_adaptive));

@@ -2,6 +2,8 @@
 // src/backend/cpu/mixed/find/mod.rs. Numbers are in no order; nothing depends on it.
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
+// Peeled layers per sample.
+@group(1) @binding(27) var<storage, read> peel_state: array<PeelState>;
 
 // Places where colours break off, slightly or more, that concern the pixel itself, the one on its right, and the one
 // below it.
@@ -22,7 +24,7 @@ fn mixed_pixels(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_work
         | (breaks_in(pixel + vec2(1, 0)) & LEFT_PLACES)
         | (breaks_in(pixel - vec2(0, 1)) & OWN_PLACES)
         | (breaks_in(pixel + vec2(0, 1)) & UPPER_PLACES);
-    if found == 0u {
+    if found == 0u || (has(PEELING) && has_layer(i)) {
         atomicStore(&mixed[number_at(i)], 0u);
         return;
     }
@@ -31,6 +33,17 @@ fn mixed_pixels(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_work
     atomicStore(&mixed[number_at(i)], (number + 1u) | few);
     atomicStore(&mixed[pixel_at(number)], i | few);
     atomicStore(&mixed[list_at(number)], LIST_END);
+}
+
+// True if a layer is seen at some sample of the i-th pixel.
+fn has_layer(i: u32) -> bool {
+    let samples_px = u32(sample_count());
+    for (var s = 0u; s < samples_px; s++) {
+        if peel_state[i * samples_px + s].color.w > 0.0 {
+            return true;
+        }
+    }
+    return false;
 }
 
 fn breaks_in(pixel: vec2<i32>) -> u32 {

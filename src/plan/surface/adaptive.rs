@@ -1,20 +1,24 @@
 //! Adaptive samples: which pictures have them, and how many samples the others get instead.
 
+use crate::plan::PeelingPass;
 use crate::plan::context::PlanContext;
 use crate::scene::Scene;
 use crate::spec::Samples;
 use crate::warning::Warning;
 
-/// Samples per pixel of pictures that ask for adaptive ones and cannot have them.
-const INSTEAD: u32 = 16;
+/// Samples per pixel of pictures that ask for adaptive ones and cannot have them, or have layers: what lies under a layer
+/// is never drawn from coverage points.
+const MANY: u32 = 16;
 
 /// The kinds of things that a plan draws.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown {
     /// True if faces are filled, or an outline's triangles are.
     pub faces: bool,
-    /// True if something is transparent.
-    pub layers: bool,
+    /// True if some of these faces hide what lies behind them.
+    pub is_opaque: bool,
+    /// What is transparent.
+    pub layers: Option<PeelingPass>,
 }
 
 /// Samples in every pixel, and true if mixed pixels are drawn from coverage points besides.
@@ -23,14 +27,14 @@ pub fn samples(scene: &Scene<'_, '_>, shown: Shown, cx: &mut PlanContext<'_>) ->
     if let Samples::Fixed(samples) = samples {
         return (samples, false);
     }
-    let reason = if !shown.faces {
-        "no face is filled"
-    } else if shown.layers {
-        "something is transparent"
-    } else {
-        return (samples.per_pixel(), true);
+    let reason = match shown.layers {
+        _ if !shown.faces => "no face is filled",
+        None => return (samples.per_pixel(), true),
+        Some(layers) if layers.wires_only => "wires show through faces",
+        Some(_) if !shown.is_opaque => "all faces are transparent",
+        Some(_) => return (MANY, true),
     };
-    let detail = format!("image.samples is adaptive, and {reason}: each pixel has {INSTEAD} samples instead");
+    let detail = format!("image.samples is adaptive, and {reason}: each pixel has {MANY} samples instead");
     cx.warnings.push(Warning { code: "samples_fixed", detail });
-    (INSTEAD, false)
+    (MANY, false)
 }

@@ -60,10 +60,16 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
         if plan.is_adaptive {
             let (width, first) = (plan.width_px as usize, scratch.samples.shown[0]);
             let (pixels, _) = rgba.as_chunks_mut::<4>();
-            draw_mixed(context, (&bins.triangles, band), &scratch.samples, &mut scratch.mixed, |x, y, color| {
-                let resolver = Resolver::new(plan.background_at(y), context.srgb);
-                pixels[(y - first) as usize * width + x as usize] = resolver.pixel(color);
-            });
+            draw_mixed(
+                context,
+                (&bins.triangles, band),
+                (&scratch.samples, None),
+                &mut scratch.mixed,
+                |x, y, color| {
+                    let resolver = Resolver::new(plan.background_at(y), context.srgb);
+                    pixels[(y - first) as usize * width + x as usize] = resolver.pixel(color);
+                },
+            );
             lap.end(DrawStage::Mixed);
         }
         return;
@@ -83,7 +89,9 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
     }
     if plan.has_mixed() {
         let (width, first) = (plan.width_px as usize, scratch.samples.shown[0]);
-        let (samples, colors) = (&scratch.samples, &mut scratch.colors);
+        // The scratch may still hold what belongs to another plan.
+        let layers = scratch.peel.as_ref().filter(|_| plan.peeling().is_some());
+        let (samples, colors) = ((&scratch.samples, layers), &mut scratch.colors);
         draw_mixed(context, (&bins.triangles, band), samples, &mut scratch.mixed, |x, y, color| {
             colors[(y - first) as usize * width + x as usize] = color;
         });

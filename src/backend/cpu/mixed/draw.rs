@@ -9,6 +9,7 @@ use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::lines::coverage::BorderPoints;
+use crate::backend::cpu::peeling::state::PeelBand;
 
 /// Buffers of the stage.
 #[derive(Default)]
@@ -48,18 +49,18 @@ impl MixedScratch {
     }
 }
 
-/// Draws the mixed pixels of a band: calls `each` with the column, the row and the colour of each
-/// (premultiplied linear RGBA, nothing behind it).
+/// Draws the mixed pixels of a band in which no layer is seen: calls `each` with the column, the row and the colour of
+/// each (premultiplied linear RGBA, nothing behind it).
 pub fn draw_mixed(
     context: &RasterContext<'_>,
     bins: (&[TriangleBin], usize),
-    samples: &SampleBand,
+    (samples, layers): (&SampleBand, Option<&PeelBand>),
     scratch: &mut MixedScratch,
     mut each: impl FnMut(u32, u32, [f32; 4]),
 ) {
     let MixedScratch { pixels, finder, lists, recent, found, border } = scratch;
     let triangles = BandTriangles::new(context, bins);
-    find(context.isa, context, &triangles, samples, finder, pixels);
+    find(context.isa, context, &triangles, (samples, layers), finder, pixels);
     let all = pixels.columns.len();
     context.watch.count_mixed(all);
     recent.clear();

@@ -39,6 +39,11 @@ impl PeelBand {
         self.colors[self.found.index(x as i32, y as i32, s)][3]
     }
 
+    /// True if a layer is seen at some sample of pixel (x, y).
+    pub fn has_layer(&self, x: u32, y: u32) -> bool {
+        (0..self.found.samples).any(|s| self.alpha(x, y, s) > 0.0)
+    }
+
     /// Clears the state and moves it to the shown rows of `base`.
     pub fn reset(&mut self, base: &SampleBand) {
         for samples in [&mut self.found, &mut self.previous] {

@@ -171,7 +171,7 @@ const THIN: &[Binding] = &[
     (Slot::Mixed, ReadWrite),
 ];
 
-const MIXED_PIXELS: &[Binding] = &[(Slot::Mixed, ReadWrite)];
+const MIXED_PIXELS: &[Binding] = &[(Slot::Mixed, ReadWrite), (Slot::PeelState, Read)];
 
 const MIXED_COLOR: &[Binding] = &[
     (Slot::Positions, Read),

@@ -215,8 +215,10 @@ impl Kernel {
                 return [MIXED_PLACE, MIXED_LATTICE, SHARES, POINT_SETS, kernel].concat();
             }
             Self::MixedSum => return [MIXED_PLACE, include_str!("../../../../shaders/mixed/mixed_sum.wgsl")].concat(),
-            // Numbers of pixels alone.
-            _ => return [MIXED_PLACE, include_str!("../../../../shaders/mixed/find/mixed_pixels.wgsl")].concat(),
+            _ => {
+                let kernel = include_str!("../../../../shaders/mixed/find/mixed_pixels.wgsl");
+                return [MIXED_PLACE, PEEL_STATE, kernel].concat();
+            }
         };
         [&[TRIANGLE], SHADE, parts].concat().concat()
     }
@@ -247,7 +249,7 @@ impl Kernel {
             Self::VisibilityTile { target: SampleTarget::Points | SampleTarget::Lists, .. } => 0,
             Self::Breaks => SHADED,
             Self::Thin => SHADED | key::PASS_MASKS,
-            Self::MixedPixels => 0,
+            Self::MixedPixels => key::PEELING | key::SAMPLES,
             Self::MixedColor => SHADED | key::OCCLUSION | key::LINES,
             Self::MixedParts => key::LINES | key::CLIPPED,
             Self::MixedShade => SHADED | key::OCCLUSION,

@@ -82,7 +82,7 @@ pub fn each_case(mut each: impl FnMut(&DrawPlan<'_>, Case)) {
                 for (is_peeled, passes) in [(false, 1), (true, 1), (false, 128), (true, 0)] {
                     let mut case = Case { size_px, samples, is_peeled, passes, width_px, shown, beyond: 0 };
                     each(&plan(&[[0; 3]], case), case);
-                    if samples == 4 && !is_peeled {
+                    if samples == if is_peeled { 16 } else { 4 } {
                         let mut adaptive = plan(&[[0; 3]], case);
                         adaptive.is_adaptive = true;
                         each(&adaptive, case);

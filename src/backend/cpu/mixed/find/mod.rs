@@ -3,7 +3,7 @@
 //! A pixel is mixed if its samples and those of its four neighbours show several faces (or a face and
 //! nothing) and colours break off from one to the next ([`Pairs::step`]). Where an edge goes through a pixel
 //! without parting its samples, it parts those of neighbours. Pixels of thin triangles are mixed, too, which no
-//! sample need see ([`thin`]).
+//! sample need see ([`thin`]). Those in which a layer is seen are not: it is composited sample by sample.
 //!
 //! Most pixels are passed over quickly: all their samples show one face ([`differing`]), or faces that look alike
 //! ([`coarse`]).
@@ -27,6 +27,7 @@ use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::isa::dispatch;
+use crate::backend::cpu::peeling::state::PeelBand;
 
 /// Places where colours break off from sample to sample, slightly or more.
 pub mod breaks {
@@ -103,11 +104,11 @@ impl Finder {
 }
 
 dispatch! {
-    /// Finds the mixed pixels of a band's shown rows.
+    /// Finds the mixed pixels of a band's shown rows, given its samples and the layers over them.
     pub fn find(
         context: &RasterContext<'_>,
         triangles: &BandTriangles<'_>,
-        band: &SampleBand,
+        band: (&SampleBand, Option<&PeelBand>),
         finder: &mut Finder,
         mixed: &mut MixedPixels,
     ) = find_kernel
@@ -117,7 +118,7 @@ dispatch! {
 fn find_kernel(
     context: &RasterContext<'_>,
     triangles: &BandTriangles<'_>,
-    band: &SampleBand,
+    (band, layers): (&SampleBand, Option<&PeelBand>),
     finder: &mut Finder,
     mixed: &mut MixedPixels,
 ) {
@@ -150,8 +151,20 @@ fn find_kernel(
             }
         }
     }
-    for marks in marks.chunks_exact(size[0]) {
+    for (y, marks) in (band.shown[0]..).zip(marks.chunks_exact_mut(size[0])) {
+        if let Some(layers) = layers {
+            leave_layers(layers, y, marks);
+        }
         mixed.push_row(marks);
+    }
+}
+
+/// Takes the marks of those pixels of a row in which a layer is seen.
+fn leave_layers(layers: &PeelBand, y: u32, marks: &mut [u8]) {
+    for (x, mark) in (0..).zip(marks) {
+        if *mark != 0 && layers.has_layer(x, y) {
+            *mark = 0;
+        }
     }
 }
 
@@ -217,6 +230,10 @@ fn breaks_at(context: &RasterContext<'_>, band: &SampleBand, [x, y]: [i32; 2], p
 /// The same, given the ids of the pixel's samples and those of the first sample of the pixel on the left and above.
 #[inline(always)]
 fn breaks_of(context: &RasterContext<'_>, ids: &[u32], [left, upper]: [u32; 2], pairs: &mut Pairs<'_>) -> u8 {
+    let others = (left ^ ids[0]) | (upper ^ ids[0]);
+    if ids.iter().fold(others, |difference, id| difference | (id ^ ids[0])) == 0 {
+        return 0;
+    }
     let mut found = 0;
     for id in ids {
         pairs.remember(context, *id);
