@@ -31,21 +31,69 @@ impl TipRange {
     }
 
     /// Marks the pixels around a face's tips: they get strokes.
-    #[inline(always)]
     pub fn mark(&self, context: &RasterContext<'_>, band: &SampleBand, id: u32, holes: &mut Holes) {
-        for (vertex, corner) in context.triangle(id).into_iter().zip(&context.screen_triangle(id)) {
-            let [x, y] = [corner.x + self.half[0], corner.y + self.half[1]].map(|v| v >> 8);
-            let [columns, rows] = self.looked_at;
-            if x < columns[0] || x >= columns[1] || y < rows[0] || y >= rows[1] {
-                continue;
-            }
-            let ids = band.pixel(x, y).0;
-            // Most corners are seen, or those of what is seen, or hidden by all that is seen.
-            let is_known = ids.contains(&id) || ids.iter().any(|&other| is_no_face_or_has(context, other, vertex));
-            if !is_known && is_before_some_around(band, corner, [x, y]) && is_tip(context, ids, corner) {
-                holes.mark_around([x, y], self.reach, MARKED | STROKED);
+        for vertex in context.triangle(id) {
+            self.mark_vertex(context, band, (id, vertex), holes);
+        }
+    }
+
+    /// The same, but for corners that were looked at last: a corner is a tip of all of its faces that no sample shows.
+    #[inline(always)]
+    pub fn mark_new(
+        &self,
+        context: &RasterContext<'_>,
+        band: &SampleBand,
+        (id, recent): (u32, &mut RecentVertices),
+        holes: &mut Holes,
+    ) {
+        for vertex in context.triangle(id) {
+            if recent.is_new(vertex) {
+                self.mark_vertex(context, band, (id, vertex), holes);
             }
         }
+    }
+
+    /// Marks the pixels around a corner of a face if it is a tip.
+    #[inline(always)]
+    fn mark_vertex(
+        &self,
+        context: &RasterContext<'_>,
+        band: &SampleBand,
+        (id, vertex): (u32, u32),
+        holes: &mut Holes,
+    ) {
+        let corner = &context.vertices[vertex as usize];
+        let [x, y] = [corner.x + self.half[0], corner.y + self.half[1]].map(|v| v >> 8);
+        let [columns, rows] = self.looked_at;
+        if x < columns[0] || x >= columns[1] || y < rows[0] || y >= rows[1] {
+            return;
+        }
+        let ids = band.pixel(x, y).0;
+        // Most corners are seen, or those of what is seen, or hidden by all that is seen.
+        let is_known = ids.contains(&id) || ids.iter().any(|&other| is_no_face_or_has(context, other, vertex));
+        if !is_known && is_before_some_around(band, corner, [x, y]) && is_tip(context, ids, corner) {
+            holes.mark_around([x, y], self.reach, MARKED | STROKED);
+        }
+    }
+}
+
+/// Vertices that are remembered: a power of two.
+const RECENT: usize = 512;
+
+/// Vertices that were looked at last: neighbouring faces share them.
+pub(in crate::backend::cpu::lines) struct RecentVertices([u32; RECENT]);
+
+impl RecentVertices {
+    /// None.
+    pub fn new() -> Self {
+        Self([u32::MAX; RECENT])
+    }
+
+    /// True if a vertex is not among them. It is from then on.
+    #[inline(always)]
+    fn is_new(&mut self, vertex: u32) -> bool {
+        let place = &mut self.0[vertex as usize % RECENT];
+        std::mem::replace(place, vertex) != vertex
     }
 }
 

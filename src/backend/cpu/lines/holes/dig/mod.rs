@@ -7,7 +7,7 @@ mod small;
 
 use self::small::{add_areas, masked};
 use super::inset::{Inset, Insets};
-use super::tips::TipRange;
+use super::tips::{RecentVertices, TipRange};
 use super::{Holes, half_width, looked_at, marks_of_hidden};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::BoxedFace;
@@ -154,6 +154,7 @@ struct Digger<'a, const S: usize> {
     looked_at: [[i32; 2]; 2],
     reach: i32,
     tips: TipRange,
+    recent: RecentVertices,
     /// Places of the samples of eight pixels of a row, 1/256 px from the corner of the first.
     offsets: [[[f32; S]; LANES]; 2],
     /// Pixels looked at since the last poll of the deadline.
@@ -178,6 +179,7 @@ impl<'a, const S: usize> Digger<'a, S> {
             looked_at: looked_at(band, reach),
             reach,
             tips: TipRange::new(plan, pass, band),
+            recent: RecentVertices::new(),
             offsets: std::array::from_fn(|axis| {
                 std::array::from_fn(|pixel| std::array::from_fn(|s| place(axis, pixel, s)))
             }),
@@ -207,7 +209,7 @@ impl<'a, const S: usize> Digger<'a, S> {
         let insets = Insets::of(self.context, &faces.ids, self.half, self.half_width);
         for (l, &id) in faces.ids.iter().enumerate().take(faces.len) {
             if insets.is_open[l] != 0 {
-                self.tips.mark(self.context, self.band, id, holes);
+                self.tips.mark_new(self.context, self.band, (id, &mut self.recent), holes);
                 self.dig(&insets.get(l, self.half), id, holes);
             }
         }
