@@ -39,7 +39,7 @@ fn mixed_pixels(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_work
 fn has_layer(i: u32) -> bool {
     let samples_px = u32(sample_count());
     for (var s = 0u; s < samples_px; s++) {
-        if peel_state[i * samples_px + s].color.w > 0.0 {
+        if any(peel_state[i * samples_px + s].color != vec4(0.0)) {
             return true;
         }
     }

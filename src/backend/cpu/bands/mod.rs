@@ -41,7 +41,7 @@ use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::resolve::Resolver;
 use crate::backend::cpu::surface::flat::{draw_flat, shade_flat};
 use crate::backend::cpu::surface::light::Light;
-use crate::backend::cpu::surface::together;
+use crate::backend::cpu::surface::together::shade_band;
 use crate::plan::{LinePass, OcclusionPass};
 
 /// Edges between two polls of the deadline. Wide lines count their pixels too.
@@ -258,11 +258,6 @@ dispatch! {
 }
 
 dispatch! {
-    /// The shade stage of a band.
-    pub fn shade_band(context: &RasterContext<'_>, samples: &SampleBand, colors: &mut [[f32; 4]]) = together::shade
-}
-
-dispatch! {
     /// The line stage of a band.
     pub fn draw_edges(
         context: &RasterContext<'_>,
@@ -285,7 +280,11 @@ fn triangles_kernel(context: &RasterContext<'_>, bins: &Bins, band: usize, sampl
 fn triangles_sampled<const S: usize>(context: &RasterContext<'_>, bins: &Bins, band: usize, samples: &mut SampleBand) {
     let mut poll = DeadlinePoll::new(context.deadline);
     for (id, piece) in bins.triangles.iter().flat_map(|chunk| chunk.pieces_in(band)) {
-        let tested = Setup::new(piece).map_or(0, |setup| visibility::draw::<S>(&setup, id, &mut Nearest(samples)));
+        // Not in a closure, which would be compiled for the baseline.
+        let tested = match Setup::new(piece) {
+            Some(setup) => visibility::draw::<S>(&setup, id, &mut Nearest(samples)),
+            None => 0,
+        };
         if poll.is_expired(tested) {
             return;
         }

@@ -102,7 +102,10 @@ pub fn draw<const S: usize>(setup: &Setup, id: u32, target: &mut impl Target) ->
     let lanes = [Lanes::new::<S>(&edges, 0), Lanes::new::<S>(&edges, LANES)];
     let size_px = target.band().size_px;
     let Some(bounds) = setup.bounds(size_px, target.band().range()) else { return 0 };
-    for_each_block::<S>(&edges, bounds, size_px, |block| block.draw::<S>(setup, &edges, &lanes, id, target));
+    let mut blocks = Blocks::new::<S>(&edges, bounds, size_px);
+    while let Some(block) = blocks.next() {
+        block.draw::<S>(setup, &edges, &lanes, id, target);
+    }
     let [columns, rows] = bounds;
     (columns[1] - columns[0] + 1) as u64 * (rows[1] - rows[0] + 1) as u64 * S as u64
 }
@@ -117,7 +120,8 @@ pub fn for_each_part<const S: usize>(
 ) {
     let edges = Edges::new(setup);
     let Some(bounds) = setup.bounds(size_px, range) else { return };
-    for_each_block::<S>(&edges, bounds, size_px, |block| {
+    let mut blocks = Blocks::new::<S>(&edges, bounds, size_px);
+    while let Some(block) = blocks.next() {
         let [last_column, last_row] = [block.column + block.size[0] - 1, block.row + block.size[1] - 1];
         each(&Parts {
             bounds: [[[block.column], [last_column]], [[block.row], [last_row]]],
@@ -128,7 +132,7 @@ pub fn for_each_part<const S: usize>(
             depth: setup.depth.map(|v| [v]),
             depth_range: setup.depth_range.map(|v| [v]),
         });
-    });
+    }
 }
 
 /// `N` rectangles of pixels, and what a triangle is in each.
@@ -170,28 +174,44 @@ impl<const N: usize> Parts<N> {
     }
 }
 
-#[inline(always)]
-fn for_each_block<const S: usize>(
-    edges: &Edges,
-    [columns, rows]: [[i32; 2]; 2],
-    size_px: [u32; 2],
-    mut each: impl FnMut(&Block),
-) {
-    // All samples lie multiples of 1/16 px from here.
-    let shift = sample_offsets(S as u32)[0][0] & 15;
-    let origin = [size_px[0] as i32 * 128 - shift, size_px[1] as i32 * 128 - shift];
-    let mut row = rows[0];
-    while row <= rows[1] {
-        let mut column = columns[0];
-        while column <= columns[1] {
-            let corner = [column * 256 - origin[0], row * 256 - origin[1]];
-            if let Some(values) = edges.at(corner) {
-                let size = [(columns[1] - column + 1).min(BLOCK), (rows[1] - row + 1).min(BLOCK)];
-                each(&Block { column, row, size, corner, values });
+/// The blocks of 8 x 8 pixels of a rectangle that may hold some of a triangle. A loop over them is no closure, which would
+/// be compiled for the baseline.
+struct Blocks<'a> {
+    edges: &'a Edges,
+    columns: [i32; 2],
+    last_row: i32,
+    /// The next block.
+    column: i32,
+    row: i32,
+    /// The picture's corner from its centre, 1/256 px.
+    origin: [i32; 2],
+}
+
+impl<'a> Blocks<'a> {
+    #[inline(always)]
+    fn new<const S: usize>(edges: &'a Edges, [columns, rows]: [[i32; 2]; 2], size_px: [u32; 2]) -> Self {
+        // All samples lie multiples of 1/16 px from here.
+        let shift = sample_offsets(S as u32)[0][0] & 15;
+        let origin = [size_px[0] as i32 * 128 - shift, size_px[1] as i32 * 128 - shift];
+        Self { edges, columns, last_row: rows[1], column: columns[0], row: rows[0], origin }
+    }
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Block> {
+        while self.row <= self.last_row {
+            while self.column <= self.columns[1] {
+                let (column, row) = (self.column, self.row);
+                self.column += BLOCK;
+                let corner = [column * 256 - self.origin[0], row * 256 - self.origin[1]];
+                if let Some(values) = self.edges.at(corner) {
+                    let size = [(self.columns[1] - column + 1).min(BLOCK), (self.last_row - row + 1).min(BLOCK)];
+                    return Some(Block { column, row, size, corner, values });
+                }
             }
-            column += BLOCK;
+            self.column = self.columns[0];
+            self.row += BLOCK;
         }
-        row += BLOCK;
+        None
     }
 }
 

@@ -8,11 +8,12 @@
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
-use crate::backend::cpu::isa::dispatch;
+use crate::backend::cpu::isa::{LANES, dispatch};
 use crate::backend::cpu::peeling::emit_layer::peel_layer;
 use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::surface::point::Show;
 use crate::backend::cpu::surface::shade::Shader;
+use crate::backend::cpu::surface::together::shade_band;
 use crate::plan::{PeelingPass, pass_mask};
 
 /// Shades a band: the peeled layers, and the surface under them.
@@ -36,7 +37,12 @@ pub fn draw(
             break;
         }
     }
-    shade_surface(context.isa, context, base, peel, colors);
+    // A surface that shows its wires in layers alone differs from one without layers.
+    let is_shaded = !pass.wires_only && !context.is_plain;
+    if is_shaded {
+        shade_band(context.isa, context, base, colors);
+    }
+    shade_surface(context.isa, context, base, peel, is_shaded, colors);
 }
 
 /// The visibility words of layer number `layer`, unshaded: 0 where a sample has none.
@@ -77,8 +83,15 @@ dispatch! {
 }
 
 dispatch! {
-    /// Shades the surface, composites it under the layers, and averages each pixel's samples.
-    pub fn shade_surface(context: &RasterContext<'_>, base: &SampleBand, peel: &PeelBand, colors: &mut [[f32; 4]]) = shade_surface_kernel
+    /// Shades the surface, composites it under the layers, and averages each pixel's samples. If `is_shaded`, pixels have
+    /// the colours of the surface alone already: those without layers keep them.
+    pub fn shade_surface(
+        context: &RasterContext<'_>,
+        base: &SampleBand,
+        peel: &PeelBand,
+        is_shaded: bool,
+        colors: &mut [[f32; 4]],
+    ) = shade_surface_kernel
 }
 
 #[inline(always)]
@@ -100,43 +113,74 @@ fn shade_layer_sampled<const S: usize>(
     peel: &mut PeelBand,
     is_open: &mut bool,
 ) {
-    let hull = context.plan.hull.as_ref().filter(|_| context.plan.has_peeled_hull());
-    let triangles = context.plan.triangles.len() as u32;
     let mut shader = Shader::new(context);
+    let width = peel.found.size_px[0];
     for y in peel.found.shown[0]..peel.found.shown[1] {
-        for x in 0..peel.found.size_px[0] {
-            let first = peel.found.index(x as i32, y as i32, 0);
-            let in_base = floor.map_or(0, |base| base.index(x as i32, y as i32, 0));
-            let mut ids = [NOTHING; S];
-            let mut any = false;
-            for s in 0..S {
-                let at = first + s;
-                let Some(id) = peel.take_layer(floor, at, in_base + s) else { continue };
-                any = true;
-                let Some(hull) = hull else {
-                    ids[s] = id;
-                    continue;
-                };
-                let bit = 1 << (hull.material(id as usize) % 32);
-                if id < triangles || peel.materials[at] & bit == 0 {
-                    ids[s] = id;
-                }
-                peel.materials[at] |= bit;
-            }
-            if !any {
+        for left in (0..width).step_by(LANES) {
+            let right = width.min(left + LANES as u32);
+            let first = peel.found.index(left as i32, y as i32, 0);
+            let in_base = match floor {
+                Some(base) => base.index(left as i32, y as i32, 0),
+                None => 0,
+            };
+            // Most pixels have no layer, or no more.
+            if peel.are_finished(floor, first, in_base, (right - left) as usize * S) {
                 continue;
             }
-            shader.groups((ids, None), [x, y], |_| show, |same, color| peel.accumulate(first, same, color));
-            for s in 0..S {
-                *is_open |= peel.previous.depth[first + s] > 0.0;
+            for i in 0..(right - left) as usize {
+                let Some(ids) = take_layer::<S>(context, floor, peel, [first + i * S, in_base + i * S]) else {
+                    continue;
+                };
+                let first = first + i * S;
+                let each = |same, color| peel.accumulate(first, same, color);
+                shader.groups((ids, None), [left + i as u32, y], |_| show, each);
+                for s in 0..S {
+                    *is_open |= peel.previous.depth[first + s] > 0.0;
+                }
             }
         }
     }
 }
 
+/// Takes the layer found in the pixel at these indices, among the layer's samples and the base's. Returns the triangles
+/// that it shows, or None if all samples are finished.
 #[inline(always)]
-fn shade_surface_kernel(context: &RasterContext<'_>, base: &SampleBand, peel: &PeelBand, colors: &mut [[f32; 4]]) {
-    for_samples!(base.samples, shade_surface_sampled(context, base, peel, colors));
+fn take_layer<const S: usize>(
+    context: &RasterContext<'_>,
+    floor: Option<&SampleBand>,
+    peel: &mut PeelBand,
+    [first, in_base]: [usize; 2],
+) -> Option<[u32; S]> {
+    let hull = context.plan.hull.as_ref().filter(|_| context.plan.has_peeled_hull());
+    let triangles = context.plan.triangles.len() as u32;
+    let mut ids = [NOTHING; S];
+    let mut any = false;
+    for s in 0..S {
+        let at = first + s;
+        let Some(id) = peel.take_layer(floor, at, in_base + s) else { continue };
+        any = true;
+        let Some(hull) = hull else {
+            ids[s] = id;
+            continue;
+        };
+        let bit = 1 << (hull.material(id as usize) % 32);
+        if id < triangles || peel.materials[at] & bit == 0 {
+            ids[s] = id;
+        }
+        peel.materials[at] |= bit;
+    }
+    any.then_some(ids)
+}
+
+#[inline(always)]
+fn shade_surface_kernel(
+    context: &RasterContext<'_>,
+    base: &SampleBand,
+    peel: &PeelBand,
+    is_shaded: bool,
+    colors: &mut [[f32; 4]],
+) {
+    for_samples!(base.samples, shade_surface_sampled(context, base, peel, is_shaded, colors));
 }
 
 #[inline(always)]
@@ -144,6 +188,7 @@ fn shade_surface_sampled<const S: usize>(
     context: &RasterContext<'_>,
     base: &SampleBand,
     peel: &PeelBand,
+    is_shaded: bool,
     colors: &mut [[f32; 4]],
 ) {
     let plan = context.plan;
@@ -158,6 +203,12 @@ fn shade_surface_sampled<const S: usize>(
     for y in base.shown[0]..base.shown[1] {
         for x in 0..base.size_px[0] {
             let Some(out) = colors.next() else { return };
+            if is_shaded {
+                if !peel.has_layer(x, y) {
+                    continue;
+                }
+                *out = [0.0; 4];
+            }
             let [in_base, first] = [base, &peel.found].map(|band| band.index(x as i32, y as i32, 0));
             let mut ids = [NOTHING; S];
             for s in 0..S {

@@ -39,15 +39,21 @@ impl Target for Behind<'_> {
             self.previous.ids.get(at..).and_then(|d| d.first_chunk::<LANES>()),
         );
         let (Some(depths), Some(ids), Some(last_depths), Some(last_ids)) = lanes else { return };
-        let (old_depths, old_ids) = (*depths, *ids);
-        let mut keep = [0_u32; LANES];
+        let (old_depths, old_ids, last_depths, last_ids) = (*depths, *ids, *last_depths, *last_ids);
+        // All ones where the triangle is not seen behind the previous layer, and where the old sample stays. Whole-array
+        // steps without branches are what compilers turn into vector instructions.
+        let (mut closed, mut keep) = ([0_u32; LANES], [0_u32; LANES]);
         for l in 0..LANES {
             let behind = (z[l] < last_depths[l]) | ((z[l] == last_depths[l]) & (id > last_ids[l]));
+            closed[l] = ((outside[l] >> 31) as u32) | u32::from(behind & (z[l] > 0.0)).wrapping_sub(1);
+        }
+        if closed == [u32::MAX; LANES] {
+            return;
+        }
+        for l in 0..LANES {
             let nearer = (z[l] > old_depths[l]) | ((z[l] == old_depths[l]) & (id < old_ids[l]));
-            let open = !((outside[l] >> 31) as u32) & u32::from(behind & (z[l] > 0.0)).wrapping_neg();
-            self.pending[l] |= open;
-            // All ones where the old sample stays.
-            keep[l] = !(open & u32::from(nearer).wrapping_neg());
+            keep[l] = closed[l] | u32::from(nearer).wrapping_sub(1);
+            self.pending[l] |= !closed[l];
         }
         for l in 0..LANES {
             depths[l] = f32::from_bits((old_depths[l].to_bits() & keep[l]) | (z[l].to_bits() & !keep[l]));
@@ -74,29 +80,34 @@ fn peel_sampled<const S: usize>(
         pieces.chain(chunk.whole_in(band).map(|id| (id, None)))
     });
     for (item, (id, piece)) in items.enumerate() {
-        let corners = || piece.copied().unwrap_or_else(|| context.screen_triangle(id));
-        if poll.is_expired(offer::<S>(item, id, corners, found, previous, pending)) {
+        // An earlier round has found all of its samples.
+        let is_done = pending.get(item) == Some(&false);
+        let looked_at = match piece {
+            _ if is_done => 0,
+            Some(piece) => offer::<S>(item, (id, *piece), found, previous, pending),
+            None => offer::<S>(item, (id, context.screen_triangle(id)), found, previous, pending),
+        };
+        if poll.is_expired(looked_at) {
             return;
         }
     }
 }
 
-/// Draws the band's triangle number `item`, unless an earlier round has found all of its samples.
-/// Returns the number of samples tested.
+/// Draws the band's triangle number `item`. Returns the number of samples tested.
 #[inline(always)]
 fn offer<const S: usize>(
     item: usize,
-    id: u32,
-    corners: impl Fn() -> [ScreenVertex; 3],
+    (id, corners): (u32, [ScreenVertex; 3]),
     found: &mut SampleBand,
     previous: &SampleBand,
     pending: &mut Vec<bool>,
 ) -> u64 {
-    if pending.get(item) == Some(&false) {
-        return 0;
-    }
     let mut target = Behind { found, previous, pending: [0; LANES] };
-    let looked_at = Setup::new(&corners()).map_or(0, |setup| visibility::draw::<S>(&setup, id, &mut target));
+    // Not in a closure, which would be compiled for the baseline.
+    let looked_at = match Setup::new(&corners) {
+        Some(setup) => visibility::draw::<S>(&setup, id, &mut target),
+        None => 0,
+    };
     let is_pending = target.pending != [0; LANES];
     match pending.get_mut(item) {
         Some(kept) => *kept = is_pending,

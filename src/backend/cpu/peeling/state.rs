@@ -40,8 +40,10 @@ impl PeelBand {
     }
 
     /// True if a layer is seen at some sample of pixel (x, y).
+    #[inline(always)]
     pub fn has_layer(&self, x: u32, y: u32) -> bool {
-        (0..self.found.samples).any(|s| self.alpha(x, y, s) > 0.0)
+        let first = self.found.index(x as i32, y as i32, 0);
+        self.colors[first..first + self.found.samples as usize].iter().any(|color| *color != [0.0; 4])
     }
 
     /// Clears the state and moves it to the shown rows of `base`.
@@ -76,12 +78,44 @@ impl PeelBand {
         }
     }
 
+    /// True if nothing was found for `count` samples from `first` on (from index `in_base` on in the base). They are
+    /// finished then.
+    #[inline(always)]
+    pub fn are_finished(&mut self, base: Option<&SampleBand>, first: usize, in_base: usize, count: usize) -> bool {
+        let (depths, ids) = (&self.found.depth[first..first + count], &self.found.ids[first..first + count]);
+        let mut difference = 0;
+        match base {
+            Some(base) => {
+                let all = in_base..in_base + count;
+                for (depth, base) in depths.iter().zip(&base.depth[all.clone()]) {
+                    difference |= depth.to_bits() ^ base.to_bits();
+                }
+                for (id, base) in ids.iter().zip(&base.ids[all]) {
+                    difference |= id ^ base;
+                }
+            }
+            None => {
+                for (depth, id) in depths.iter().zip(ids) {
+                    difference |= depth.to_bits() | (id ^ NOTHING);
+                }
+            }
+        }
+        if difference == 0 {
+            self.previous.depth[first..first + count].fill(0.0);
+        }
+        difference == 0
+    }
+
     /// Moves the layer found at sample `at` (index `in_base` in the base) to `previous`. Returns
     /// its id, or None if the sample is finished.
     #[inline(always)]
     pub fn take_layer(&mut self, base: Option<&SampleBand>, at: usize, in_base: usize) -> Option<u32> {
         let (depth, id) = (self.found.depth[at], self.found.ids[at]);
-        let (base_depth, base_id) = base.map_or((0.0, NOTHING), |base| (base.depth[in_base], base.ids[in_base]));
+        // Not in a closure, which would be compiled for the baseline.
+        let (base_depth, base_id) = match base {
+            Some(base) => (base.depth[in_base], base.ids[in_base]),
+            None => (0.0, NOTHING),
+        };
         if depth == base_depth && id == base_id {
             self.previous.depth[at] = 0.0;
             return None;

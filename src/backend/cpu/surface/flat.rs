@@ -200,7 +200,7 @@ impl Group {
 }
 
 dispatch! {
-    /// Shades every pixel of the band into `colors`, as [`shade`](super::together::shade) does.
+    /// Shades every pixel of the band into `colors`, as [`shade_band`](super::together::shade_band) does.
     pub fn shade_flat(context: &RasterContext<'_>, flat: &FlatColors, band: &SampleBand, colors: &mut [[f32; 4]]) = shade
 }
 

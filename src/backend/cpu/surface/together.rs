@@ -8,13 +8,17 @@ use super::waiting::{Point, Waiting};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
 use crate::backend::cpu::geometry::transform::recip;
-use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::isa::{LANES, dispatch};
 use crate::plan::{SurfacePass, sample_offsets};
 
-/// Shades every pixel of the band into `colors` (premultiplied linear RGBA, row by row, nothing
-/// behind it), which are zero.
+dispatch! {
+    /// Shades every pixel of the band into `colors` (premultiplied linear RGBA, row by row, nothing behind it), which are
+    /// zero.
+    pub fn shade_band(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) = shade
+}
+
 #[inline(always)]
-pub fn shade(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
+fn shade(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
     for_samples!(band.samples, shade_sampled(context, band, colors));
 }
 
@@ -34,7 +38,7 @@ fn shade_sampled<const S: usize>(context: &RasterContext<'_>, band: &SampleBand,
     }
 }
 
-/// As [`shade`] where the surface is shaded, many points at a time.
+/// As [`shade_band`] where the surface is shaded, many points at a time.
 #[inline(always)]
 fn shade_together<const S: usize>(
     (context, surface): (&RasterContext<'_>, &SurfacePass<'_>),

@@ -55,13 +55,7 @@ impl TipRange {
 
     /// Marks the pixels around a corner of a face if it is a tip.
     #[inline(always)]
-    fn mark_vertex(
-        &self,
-        context: &RasterContext<'_>,
-        band: &SampleBand,
-        (id, vertex): (u32, u32),
-        holes: &mut Holes,
-    ) {
+    fn mark_vertex(&self, context: &RasterContext<'_>, band: &SampleBand, (id, vertex): (u32, u32), holes: &mut Holes) {
         let corner = &context.vertices[vertex as usize];
         let [x, y] = [corner.x + self.half[0], corner.y + self.half[1]].map(|v| v >> 8);
         let [columns, rows] = self.looked_at;
