@@ -23,10 +23,6 @@
 // difference between a stroke and its points. Of more strokes in one pixel, some overlap.
 const STROKES_SIDE_BY_SIDE: f32 = 4.0;
 
-// Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent
-// pictures.
-const ALPHA_MIN: f32 = 1e-4;
-
 @compute @workgroup_size(WORKGROUP)
 fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let i = gid.x + gid.y * groups.x * WORKGROUP;

@@ -1,5 +1,9 @@
 // Stage shade, per sample: the state of depth peeling. Twin of src/backend/cpu/peeling/state.rs.
-// Written by composite.wgsl, read by emit_layer.wgsl, shade.wgsl and coverage.wgsl.
+// Written by composite.wgsl, read by emit_layer.wgsl, mixed_pixels.wgsl, shade.wgsl and coverage.wgsl.
+
+// Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent
+// pictures.
+const ALPHA_MIN: f32 = 1e-4;
 
 struct PeelState {
     // Premultiplied linear RGBA.

@@ -20,6 +20,7 @@ use super::cpu::mixed::find::thin;
 use super::cpu::mixed::thinness;
 use super::cpu::mixed::{points, triangle};
 use super::cpu::occlusion;
+use super::cpu::peeling::state as peel_state;
 use super::cpu::surface::{light, texture};
 use super::gpu::params::{Batch, FACES_BACK, FACES_BOTH, FACES_FRONT, Frame, OWN_TRIANGLES, line_flags};
 use super::gpu::pipelines::{Access, Kernel, SampleTarget, SampleWrite, Slot, key};
@@ -90,7 +91,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
         "BOX_RADIUS" = std::f32::consts::FRAC_1_SQRT_2,
         "SLACK_PX" = segment::SLACK_PX
     );
-    add!("STROKES_SIDE_BY_SIDE" = coverage::STROKES_SIDE_BY_SIDE, "ALPHA_MIN" = coverage::ALPHA_MIN);
+    add!("STROKES_SIDE_BY_SIDE" = coverage::STROKES_SIDE_BY_SIDE, "ALPHA_MIN" = peel_state::ALPHA_MIN);
     add!("NEARER_RATIO" = hidden_lines::NEARER_RATIO, "SNAP_ERROR" = hidden_lines::SNAP_ERROR);
     add!("INTERVAL_MIN_PX" = hidden_lines::INTERVAL_MIN_PX, "GAP_MIN_PX" = hidden_lines::GAP_MIN_PX);
     add!("IDS_MAX" = line_shares::IDS_MAX, "INTERVALS_MAX" = line_shares::INTERVALS_MAX);

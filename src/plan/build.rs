@@ -48,9 +48,9 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
     let occlusion = surface::occlusion::occlusion_pass(scene, surface.as_ref(), &mut cx);
     let clipped = Projection::new(camera, scene.size_px(), true);
     let hides = surface.is_some() || groups.has_hull();
-    let has_faces = groups.has_hull() || surface.as_ref().is_some_and(|surface| surface.is_shaded);
-    let is_opaque = groups.fills().contains(&Fill::Opaque);
-    let shown = surface::adaptive::Shown { faces: has_faces, is_opaque, layers: needed_pass(groups) };
+    let has_faces = groups.has_hull() || surface.as_ref().is_some_and(|s| s.is_shaded && groups.has_fill());
+    let has_opaque = groups.fills().contains(&Fill::Opaque);
+    let shown = surface::adaptive::Shown { faces: has_faces, has_opaque, layers: needed_pass(groups) };
     let (samples, is_adaptive) = surface::adaptive::samples(scene, shown, &mut cx);
     let needed_px = lines.iter().map(lines::LinePass::margin_rows).filter(|_| hides).max();
     let needed_px = needed_px.unwrap_or(0).max(u32::from(is_adaptive));

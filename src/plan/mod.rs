@@ -73,7 +73,7 @@ pub struct DrawPlan<'a> {
     /// Visibility samples per pixel: 1, 4, 8 or 16.
     pub samples: u32,
     /// True if pixels near which faces meet that differ in colour are drawn from coverage points
-    /// instead of samples. Such a plan has neither lines nor layers.
+    /// instead of samples.
     pub is_adaptive: bool,
     /// Positions in the unit box.
     pub positions: SharedSlice<'a, [f32; 3]>,

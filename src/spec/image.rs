@@ -28,7 +28,7 @@ pub struct ImageSpec {
 pub enum Samples {
     /// 1, 4, 8 or 16.
     Fixed(u32),
-    /// 4, and more in pixels that show several faces.
+    /// 4, or 16 in pictures with something transparent, and points in pixels that show several faces.
     Adaptive,
 }
 
@@ -36,7 +36,11 @@ impl Samples {
     /// The numbers that a request may ask for.
     pub const FIXED: &'static [u32] = &[1, 4, 8, 16];
 
-    /// Samples in every pixel.
+    /// Samples in every pixel, where adaptive ones are asked for, of pictures with something transparent or without
+    /// surfaces.
+    pub const LAYERED: u32 = 16;
+
+    /// Samples in every pixel of a picture in which nothing is transparent.
     pub fn per_pixel(self) -> u32 {
         match self {
             Self::Fixed(samples) => samples,

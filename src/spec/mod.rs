@@ -54,6 +54,29 @@ pub struct Spec {
     pub quality_target: Option<QualityTarget>,
 }
 
+impl Spec {
+    /// The layers of all styles: of the document, and of its materials.
+    pub fn styles(&self) -> impl Iterator<Item = &Layers> {
+        std::iter::once(&self.layers).chain(self.materials.iter().map(|(_, layers)| layers))
+    }
+
+    /// True if it asks for filled surfaces, and for nothing transparent.
+    pub fn is_opaque(&self) -> bool {
+        let surfaces = || self.styles().filter_map(|layers| layers.surface.as_ref());
+        let is_opaque =
+            |s: &Surface| s.opacity >= 1.0 && s.facing_opacity >= 1.0 && s.color.is_none_or(|color| color.0[3] >= 1.0);
+        surfaces().next().is_some() && surfaces().all(is_opaque) && self.ground == Ground::None
+    }
+
+    /// Samples in every pixel, if the mesh's own materials are opaque: adaptive ones are 16 beside what is transparent.
+    pub fn samples_per_pixel(&self) -> u32 {
+        match self.image.samples {
+            Samples::Adaptive if !self.is_opaque() => Samples::LAYERED,
+            samples => samples.per_pixel(),
+        }
+    }
+}
+
 word_enums! {
     /// What the mesh stands on.
     pub enum Ground {

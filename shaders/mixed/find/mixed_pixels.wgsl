@@ -1,4 +1,4 @@
-// Stage mixed, per pixel: whether it is mixed, and its number among those that are. Twin of join in
+// Stage mixed, per pixel: the mixed pixels, and the number of each. Twin of join and leave_layers in
 // src/backend/cpu/mixed/find/mod.rs. Numbers are in no order; nothing depends on it.
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
@@ -39,7 +39,7 @@ fn mixed_pixels(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_work
 fn has_layer(i: u32) -> bool {
     let samples_px = u32(sample_count());
     for (var s = 0u; s < samples_px; s++) {
-        if any(peel_state[i * samples_px + s].color != vec4(0.0)) {
+        if peel_state[i * samples_px + s].color.w > ALPHA_MIN {
             return true;
         }
     }

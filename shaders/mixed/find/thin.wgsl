@@ -154,22 +154,57 @@ fn line_at(origin: vec2<i32>, slope: f32, along: i32) -> i32 {
 // Marks a pixel if the triangle touches it, some sample sees what may lie behind it, none sees the triangle, and
 // colours break off.
 fn mark(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
-    // Adaptive plans have four samples. They are written out, because a thread may run few iterations only
-    // (src/backend/gpu/schedule/tiles.rs).
-    let ids = vec4(id_at(pixel, 0), id_at(pixel, 1), id_at(pixel, 2), id_at(pixel, 3));
-    let depths = vec4(depth_of(pixel, 0), depth_of(pixel, 1), depth_of(pixel, 2), depth_of(pixel, 3));
-    let are_behind = depths < vec4(s.depth_range.y);
-    if !any(are_behind) || any(ids == vec4(id)) || is_beside(e, point_edges(s, e, pixel_corner(pixel))) {
+    // Adaptive plans have four samples, or 16 where they have layers. They are written out, because a thread may run few
+    // iterations only (src/backend/gpu/schedule/tiles.rs).
+    let first = four_from(s, pixel, 0);
+    var any_behind = any(first.are_behind);
+    var is_seen = any(first.ids == vec4(id));
+    if has(SIXTEEN_SAMPLES) {
+        let second = four_from(s, pixel, 4);
+        let third = four_from(s, pixel, 8);
+        let last = four_from(s, pixel, 12);
+        any_behind |= any(second.are_behind) || any(third.are_behind) || any(last.are_behind);
+        is_seen |= any(second.ids == vec4(id)) || any(third.ids == vec4(id)) || any(last.ids == vec4(id));
+    }
+    if !any_behind || is_seen || is_beside(e, point_edges(s, e, pixel_corner(pixel))) {
         return;
     }
+    var found = 0u;
+    if has(SIXTEEN_SAMPLES) {
+        // Few pixels come so far. Compilers copy what is called, which takes long.
+        for (var n = 0; n < 16; n += 4) {
+            found |= breaks_to_four(id, four_from(s, pixel, n));
+        }
+    } else {
+        found = breaks_to_four(id, first);
+    }
+    if found != 0u {
+        atomicOr(&mixed[breaks_at(pixel)], found);
+    }
+}
+
+// Four samples of a pixel: the triangles that they see, and whether these may lie behind another one.
+struct Four {
+    ids: vec4<u32>,
+    are_behind: vec4<bool>,
+};
+
+// Those from the n-th on.
+fn four_from(s: Setup, pixel: vec2<i32>, n: i32) -> Four {
+    let ids = vec4(id_at(pixel, n), id_at(pixel, n + 1), id_at(pixel, n + 2), id_at(pixel, n + 3));
+    let depths = vec4(depth_of(pixel, n), depth_of(pixel, n + 1), depth_of(pixel, n + 2), depth_of(pixel, n + 3));
+    return Four(ids, depths < vec4(s.depth_range.y));
+}
+
+// The bits of the steps from what four samples see.
+fn breaks_to_four(id: u32, four: Four) -> u32 {
+    let ids = four.ids;
+    let are_behind = four.are_behind;
     // Most samples see what one before them sees.
     var found = breaks_to(id, ids.x, are_behind.x);
     found |= breaks_to(id, ids.y, are_behind.y && !(are_behind.x && ids.y == ids.x));
     found |= breaks_to(id, ids.z, are_behind.z && !any(are_behind.xy & (ids.xy == ids.zz)));
-    found |= breaks_to(id, ids.w, are_behind.w && !any(are_behind.xyz & (ids.xyz == ids.www)));
-    if found != 0u {
-        atomicOr(&mixed[breaks_at(pixel)], found);
-    }
+    return found | breaks_to(id, ids.w, are_behind.w && !any(are_behind.xyz & (ids.xyz == ids.www)));
 }
 
 // The bits of the step from what a sample sees, if it lies behind.

@@ -17,7 +17,7 @@ mod isa;
 pub(super) mod lines;
 pub(super) mod mixed;
 pub(super) mod occlusion;
-mod peeling;
+pub(crate) mod peeling;
 mod resolve;
 mod row_queue;
 mod stopwatch;

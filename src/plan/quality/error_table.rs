@@ -61,7 +61,7 @@ impl ErrorTable {
     /// GPU, since their pictures agree.
     ///
     /// With adaptive samples, techniques that do not get better by them have the row of the samples that all pixels
-    /// have.
+    /// of opaque pictures have.
     pub fn row(&self, technique: &str, backend: &str, samples: Samples) -> Option<&Row> {
         let find = |backend: &str, samples: Samples| {
             let is_it = |row: &&Row| row.technique == technique && row.backend == backend && row.samples.0 == samples;

@@ -3,7 +3,7 @@
 //!
 //! The expected error of a picture is the largest of its techniques' errors: at the edges of faces,
 //! and at lines along edges and around shapes. It does not cover texture filtering, smooth normals
-//! between vertices, or the order of layers. The expected time is the sum of its techniques' times,
+//! between vertices, or the order and the borders of layers. The expected time is the sum of its techniques' times,
 //! on one thread of the machine of the table: a hint for other machines.
 
 pub(crate) mod error_table;
@@ -14,8 +14,8 @@ use error_table::ErrorTable;
 
 use crate::spec::words::word_for;
 use crate::spec::{
-    BackendChoice, FlatNormals, Ground, Hidden, Layers, OutlineMethod, QualityTarget, Samples, Shading, Spec, Surface,
-    WIRE_METHODS, Wire, WireMethod, WireThickness,
+    BackendChoice, FlatNormals, Hidden, Layers, OutlineMethod, QualityTarget, Samples, Shading, Spec, WIRE_METHODS,
+    Wire, WireMethod, WireThickness,
 };
 use crate::warning::Warning;
 
@@ -111,7 +111,7 @@ fn candidates(
     triangles: usize,
     has_gpu: bool,
 ) -> Vec<Candidate> {
-    let adaptive = can_be_adaptive(spec).then_some(Samples::Adaptive);
+    let adaptive = spec.is_opaque().then_some(Samples::Adaptive);
     let all_samples = || Samples::FIXED.iter().map(|&samples| Samples::Fixed(samples)).chain(adaptive);
     let samples = if target.open.samples { all_samples().collect() } else { vec![spec.image.samples] };
     let has_open_wire = target.open.wire || target.open.material_wires.contains(&true);
@@ -139,14 +139,6 @@ fn candidates(
         }
     }
     all
-}
-
-/// True if a request asks for filled surfaces, and for nothing transparent.
-fn can_be_adaptive(spec: &Spec) -> bool {
-    let surfaces = || styles(spec).filter_map(|layers| layers.surface.as_ref());
-    let is_opaque =
-        |s: &Surface| s.opacity >= 1.0 && s.facing_opacity >= 1.0 && s.color.is_none_or(|color| color.0[3] >= 1.0);
-    surfaces().next().is_some() && surfaces().all(is_opaque) && spec.ground == Ground::None
 }
 
 /// Sets the method of the open wires; false where that would not draw the same lines.
@@ -183,14 +175,15 @@ fn as_wide(wire: &Wire, method: WireMethod) -> Option<Wire> {
 
 /// The error and the time of a picture; None where the table does not have one of its techniques.
 fn expect(table: &ErrorTable, spec: &Spec, backend: &str, triangles: usize) -> Option<[f64; 2]> {
-    let mut techniques: Vec<&str> = styles(spec).flat_map(techniques).collect();
+    let mut techniques: Vec<&str> = spec.styles().flat_map(techniques).collect();
     techniques.extend(spec.topology.map(|_| word_for(WireMethod::Exact)));
     techniques.sort_unstable();
     techniques.dedup();
     let pixels = f64::from(spec.image.width_px) * f64::from(spec.image.height_px);
+    let samples = if spec.is_opaque() { spec.image.samples } else { Samples::Fixed(spec.samples_per_pixel()) };
     let (mut error, mut time_ms) = (0.0_f64, 0.0);
     for technique in techniques {
-        let row = table.row(technique, backend, spec.image.samples)?;
+        let row = table.row(technique, backend, samples)?;
         error = error.max(table.error(row, pixels));
         time_ms += row.time_ms(pixels, triangles as f64);
     }
@@ -211,12 +204,8 @@ fn techniques(layers: &Layers) -> Vec<&'static str> {
     [surface, wire, outline].into_iter().flatten().collect()
 }
 
-fn styles(spec: &Spec) -> impl Iterator<Item = &Layers> {
-    std::iter::once(&spec.layers).chain(spec.materials.iter().map(|(_, layers)| layers))
-}
-
 fn wires(spec: &Spec) -> impl Iterator<Item = &Wire> {
-    styles(spec).filter_map(|layers| layers.wire.as_ref())
+    spec.styles().filter_map(|layers| layers.wire.as_ref())
 }
 
 #[cfg(test)]

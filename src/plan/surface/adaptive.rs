@@ -6,18 +6,14 @@ use crate::scene::Scene;
 use crate::spec::Samples;
 use crate::warning::Warning;
 
-/// Samples per pixel of pictures that ask for adaptive ones and cannot have them, or have layers: what lies under a layer
-/// is never drawn from coverage points.
-const MANY: u32 = 16;
-
 /// The kinds of things that a plan draws.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown {
     /// True if faces are filled, or an outline's triangles are.
     pub faces: bool,
-    /// True if some of these faces hide what lies behind them.
-    pub is_opaque: bool,
-    /// What is transparent.
+    /// True if faces are filled and hide what lies behind them.
+    pub has_opaque: bool,
+    /// The layers, if something is transparent.
     pub layers: Option<PeelingPass>,
 }
 
@@ -31,10 +27,11 @@ pub fn samples(scene: &Scene<'_, '_>, shown: Shown, cx: &mut PlanContext<'_>) ->
         _ if !shown.faces => "no face is filled",
         None => return (samples.per_pixel(), true),
         Some(layers) if layers.wires_only => "wires show through faces",
-        Some(_) if !shown.is_opaque => "all faces are transparent",
-        Some(_) => return (MANY, true),
+        Some(_) if !shown.has_opaque => "all faces are transparent",
+        Some(_) => return (Samples::LAYERED, true),
     };
-    let detail = format!("image.samples is adaptive, and {reason}: each pixel has {MANY} samples instead");
+    let many = Samples::LAYERED;
+    let detail = format!("image.samples is adaptive, and {reason}: each pixel has {many} samples instead");
     cx.warnings.push(Warning { code: "samples_fixed", detail });
-    (MANY, false)
+    (Samples::LAYERED, false)
 }

@@ -206,8 +206,8 @@ fn image() -> Vec<Field> {
             "null: the file extension, then the Accept header, then PNG.";
         "image.samples" |d| d.samples, short "samples", default 4;
             "Visibility samples per pixel. adaptive: 4, and 64 or 256 points in each pixel near which faces meet that differ in \
-             colour. Pictures with something transparent have 16, and points where nothing transparent is seen. Those without \
-             opaque faces have 16 samples per pixel instead, and a warning.";
+             colour. Pictures with something transparent have 16, and points in pixels that show neither that nor an outline. \
+             Pictures without opaque faces, or with barycentric wires that show through faces, have 16 alone, and a warning.";
         "image.max_error" |d| d.max_error, in Kind::Above0 { max: 255.0 }, short "max_error", default Null;
             "Largest expected error, RMSE in /255: the cheapest samples, wire.method and backend that reach it are chosen, \
              except those that are given.";

@@ -150,7 +150,7 @@ impl Estimates {
 /// and the frames of an animation have the whole size each.
 fn drawn(spec: &Spec) -> (f64, u32) {
     let Spec { image, sheet, .. } = spec;
-    let samples = f64::from(image.width_px) * f64::from(image.height_px) * f64::from(image.samples.per_pixel());
+    let samples = f64::from(image.width_px) * f64::from(image.height_px) * f64::from(spec.samples_per_pixel());
     let Some(sheet) = sheet else { return (samples, 1) };
     let is_animated = sheet.is_animated(image.format.unwrap_or(ImageFormat::Png));
     let frames = if is_animated { sheet.count() } else { 1 };

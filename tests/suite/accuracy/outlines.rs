@@ -175,7 +175,7 @@ fn hulls_are_as_wide_as_they_should_be() {
     measure(Asked { samples: "4", ..HULL }, &WIDTHS_PX, |_| FOUR_SAMPLES);
     measure(Asked { samples: "8", ..HULL }, &WIDTHS_PX, |_| GOAL);
     measure(HULL, &WIDTHS_PX, |_| GOAL);
-    // As near as contours.
+    // Borders of hulls are then as near to their true places as those of contours.
     measure(Asked { samples: "adaptive", ..HULL }, &WIDTHS_PX, |_| Gate { p99_px: 0.05, ..GOAL });
 }
 

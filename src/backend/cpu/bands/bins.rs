@@ -192,11 +192,16 @@ fn chunks_of(pass: TrianglePass) -> impl Iterator<Item = TrianglePass> {
 /// The passes of the visibility buffer, and those of depth peeling.
 fn passes(plan: &DrawPlan<'_>) -> (Vec<TrianglePass>, Vec<TrianglePass>) {
     let count = plan.triangles.len();
-    let surface = |pass_bit| plan.surface.as_ref().map(|s| TrianglePass { ids: 0..count, pass_bit, faces: s.faces });
+    // Layers are drawn from samples alone.
+    let surface = |pass_bit| {
+        let has_mixed = plan.has_mixed() && pass_bit == pass_mask::SURFACE;
+        plan.surface.as_ref().map(|s| TrianglePass { ids: 0..count, pass_bit, faces: s.faces, has_mixed })
+    };
     let around = |hull: &HullPass<'_>| TrianglePass {
         ids: count..count + hull.triangles.len(),
         pass_bit: 0,
         faces: Faces::Both,
+        has_mixed: plan.has_mixed() && !plan.has_peeled_hull(),
     };
     let hull = plan.hull.as_ref().map(around);
     // Without pass masks nothing is peeled.

@@ -36,7 +36,7 @@ impl TriangleBin {
     pub fn new(context: &RasterContext<'_>, [rows, margin]: [u32; 2], pass: &TrianglePass) -> Self {
         let plan = context.plan;
         let bands = plan.height_px.div_ceil(rows) as usize;
-        let bounds = Bounds::new(plan, [rows, margin]);
+        let bounds = Bounds::new(plan, [rows, margin], pass.has_mixed);
         let kept = keep(context, &bounds, pass);
         let mut bin = Self {
             ids: pass.ids.clone(),

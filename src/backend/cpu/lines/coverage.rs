@@ -12,7 +12,7 @@ use super::stroke::{Amount, Mask, POINTS, WORDS, count};
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::recip;
 use crate::backend::cpu::isa::dispatch;
-use crate::backend::cpu::peeling::state::PeelBand;
+use crate::backend::cpu::peeling::state::{ALPHA_MIN, PeelBand};
 use crate::backend::cpu::resolve::{is_composited, over_background};
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::sample_partition::sample_partition;
@@ -197,10 +197,6 @@ pub struct LineCompositor<'a> {
     /// The points that see the surface in mixed pixels at its border.
     border: Option<&'a BorderPoints>,
 }
-
-/// Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent
-/// pictures.
-pub const ALPHA_MIN: f32 = 1e-4;
 
 impl<'a> LineCompositor<'a> {
     /// A compositor for a band and, where the plan has them, its peeled layers and mixed pixels.

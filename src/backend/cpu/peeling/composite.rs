@@ -204,7 +204,7 @@ fn shade_surface_sampled<const S: usize>(
         for x in 0..base.size_px[0] {
             let Some(out) = colors.next() else { return };
             if is_shaded {
-                if !peel.has_layer(x, y) {
+                if peel.is_clear(x, y) {
                     continue;
                 }
                 *out = [0.0; 4];

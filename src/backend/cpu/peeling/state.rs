@@ -2,6 +2,10 @@
 
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 
+/// Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent
+/// pictures.
+pub const ALPHA_MIN: f32 = 1e-4;
+
 /// Depth peeling of a band: buffers for the rows that are shown, without the margin rows.
 pub struct PeelBand {
     /// The layer of this round; starts as a copy of the surface that hides all layers behind it.
@@ -39,11 +43,21 @@ impl PeelBand {
         self.colors[self.found.index(x as i32, y as i32, s)][3]
     }
 
-    /// True if a layer is seen at some sample of pixel (x, y).
-    #[inline(always)]
+    /// True if layers that count are seen at some sample of pixel (x, y).
     pub fn has_layer(&self, x: u32, y: u32) -> bool {
+        self.colors_of(x, y).iter().any(|color| color[3] > ALPHA_MIN)
+    }
+
+    /// True if layers have not changed any sample of pixel (x, y).
+    #[inline(always)]
+    pub fn is_clear(&self, x: u32, y: u32) -> bool {
+        self.colors_of(x, y).iter().all(|color| *color == [0.0; 4])
+    }
+
+    #[inline(always)]
+    fn colors_of(&self, x: u32, y: u32) -> &[[f32; 4]] {
         let first = self.found.index(x as i32, y as i32, 0);
-        self.colors[first..first + self.found.samples as usize].iter().any(|color| *color != [0.0; 4])
+        &self.colors[first..first + self.found.samples as usize]
     }
 
     /// Clears the state and moves it to the shown rows of `base`.

@@ -50,6 +50,7 @@ pub fn means(colors: &[[f32; 4]], ids: &[[u32; SAMPLES]; LANES], out: &mut [[f32
 #[target_feature(enable = "avx2")]
 pub fn means_of_many<const S: usize>(colors: &[[f32; 4]], pixels: &[[u32; S]], out: &mut [[f32; 4]]) -> bool {
     const { assert!(S <= u32::BITS as usize) };
+    debug_assert!(S.is_multiple_of(LANES));
     let Some(last) = colors.len().checked_sub(1) else { return false };
     let mut unknown = _mm_setzero_ps();
     for (ids, out) in pixels.iter().zip(out) {

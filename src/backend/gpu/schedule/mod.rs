@@ -34,8 +34,9 @@ pub const PIECES_MAX: u32 = 6;
 /// surface and 16 layers, filled and hull, in two phases: 17 * 77 * 2 * 2 = 5236. A pass of 30
 /// million edges that may be long is 229 chunks and three more for its coverage; 48 such passes are
 /// 11,136. That makes 0.52 million; a job with more is refused. Margin rows are no bands of their own
-/// and do not add to it. Mixed pixels take less: 512 rounds of 77 chunks, filled and hull, in two phases are 158,000, and
-/// their lists add 77 to a band with layers, and those of thin triangles 10.
+/// and do not add to it. Mixed pixels take less: 512 rounds of 77 chunks, filled and hull, in two phases are 158,000.
+/// In a band with layers, their lists are 77 more, and the search for thin triangles 10. Layers at 16 samples have four
+/// times the bands: the largest such job is refused.
 const BATCHES_MAX: usize = 1 << 19;
 
 /// Rounds of mixed pixels that are queued on a real device before their number is read back. Waiting for it takes

@@ -51,8 +51,9 @@ fn pixels_without_a_layer_are_as_if_there_were_none() {
         as_alone += usize::from(found[i] == alone[i]);
     }
     assert!(changed > 150 && changed <= mixed, "{changed} of {mixed}");
+    // Depths have other roundings where the mesh has another extent.
     assert!(as_alone * 100 >= changed * 97, "{as_alone} of {changed}");
-    // The border of the glass is not drawn from points, though it parts samples.
+    // Else the above would say nothing of the border of the glass.
     let borders = glass.iter().filter(|pixel| pixel[3] > 0 && pixel[3] < 255).count();
     assert!(borders > 150, "{borders}");
 }
@@ -66,15 +67,16 @@ fn every_way_of_drawing_gives_the_same_picture() {
     others.extend([1, 3].map(CpuRenderer::new));
     let mut gpus: Vec<GpuRenderer> = gpus().into_iter().flatten().map(|gpu| GpuRenderer::new(gpu.clone())).collect();
     let shadow = [("scene.ground", "shadow")];
-    let looks: [&[(&str, &str)]; 6] = [
+    let looks: [&[(&str, &str)]; 7] = [
         &GLASS,
         &[GLASS[0], GLASS[1], ("style", "technical")],
         &[GLASS[0], ("style", "smooth"), ("outline.thickness", "2"), ("outline.unit", "px")],
         &[GLASS[0], ("outline.method", "contour"), ("wire.thickness", "1"), ("wire.lit", "true")],
         &[GLASS[0], ("size", "480x420"), ("style", "wire")],
         &shadow,
+        // What faces the viewer is clear: its alpha is nearly 0.
+        &[GLASS[1], ("materials.left.surface.facing_opacity", "0"), GLASS[0]],
     ];
-    let mut drawn = 0;
     for look in looks {
         let plan: DrawPlan<'_> = scenes::plan(&mesh, &scenes::spec(&last_of_each(&keys(look))));
         assert!(plan.is_adaptive && plan.peeling.is_some() && plan.samples == 16, "{look:?}");
@@ -89,9 +91,7 @@ fn every_way_of_drawing_gives_the_same_picture() {
             assert_eq!(renderer.draw_times().mixed_pixels, mixed, "{look:?}");
             Likeness::of(&found, &want).assert(Tolerance::TWINS, &format!("{look:?}"));
         }
-        drawn += 1;
     }
-    assert_eq!(drawn, 6);
 }
 
 #[test]

@@ -24,6 +24,8 @@ pub struct TrianglePass {
     pub pass_bit: u8,
     /// The faces that are drawn, where a triangle's pass mask does not say.
     pub faces: Faces,
+    /// True if mixed pixels are drawn from these triangles.
+    pub has_mixed: bool,
 }
 
 impl TrianglePass {
@@ -83,11 +85,11 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Those of a plan's picture.
-    pub fn new(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2]) -> Self {
+    /// Those of a plan's picture, for a pass from whose triangles mixed pixels are drawn or not.
+    pub fn new(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2], has_mixed: bool) -> Self {
         Self {
-            has_mixed: plan.has_mixed(),
-            grid: if plan.is_adaptive { POINT_GRID } else { SampleGrid::new(plan.samples) },
+            has_mixed,
+            grid: if has_mixed { POINT_GRID } else { SampleGrid::new(plan.samples) },
             half: [plan.width_px, plan.height_px].map(|size| size as i32 * 128),
             ranges: [plan.seen_range(plan.width_px), plan.seen_range(plan.height_px)],
             rows: rows as i32,
@@ -281,8 +283,9 @@ mod tests {
         plan.is_adaptive = true;
         plan.hull = Some(HullPass::default());
         let deadline = Deadline::default();
-        let pass = TrianglePass { ids: 3..triangles.len(), pass_bit: pass_mask::SURFACE, faces: Faces::Both };
-        let bounds = Bounds::new(&plan, [17, margin]);
+        let pass =
+            TrianglePass { ids: 3..triangles.len(), pass_bit: pass_mask::SURFACE, faces: Faces::Both, has_mixed: true };
+        let bounds = Bounds::new(&plan, [17, margin], true);
         let lists = |isa: Isa| {
             let mut cpu = CpuRenderer::with_isa(1, isa);
             cpu.transform(&plan, None);

@@ -37,7 +37,8 @@ impl TipRange {
         }
     }
 
-    /// The same, but for corners that were looked at last: a corner is a tip of all of its faces that no sample shows.
+    /// The same, without the corners that were looked at last. The test depends on the corner alone, so one face of it is
+    /// enough.
     #[inline(always)]
     pub fn mark_new(
         &self,

@@ -3,7 +3,8 @@
 //! A pixel is mixed if its samples and those of its four neighbours show several faces (or a face and
 //! nothing) and colours break off from one to the next ([`Pairs::step`]). Where an edge goes through a pixel
 //! without parting its samples, it parts those of neighbours. Pixels of thin triangles are mixed, too, which no
-//! sample need see ([`thin`]). Those in which a layer is seen are not: it is composited sample by sample.
+//! sample need see ([`thin`]). Pixels in which a layer is seen are not mixed: layers are composited
+//! sample by sample.
 //!
 //! Most pixels are passed over quickly: all their samples show one face ([`differing`]), or faces that look alike
 //! ([`coarse`]).
@@ -159,7 +160,7 @@ fn find_kernel(
     }
 }
 
-/// Takes the marks of those pixels of a row in which a layer is seen.
+/// Clears the marks of those pixels of a row in which a layer is seen.
 fn leave_layers(layers: &PeelBand, y: u32, marks: &mut [u8]) {
     for (x, mark) in (0..).zip(marks) {
         if *mark != 0 && layers.has_layer(x, y) {
