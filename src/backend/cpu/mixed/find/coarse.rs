@@ -1,7 +1,7 @@
 //! Stage mixed, per pixel: a quick test that most pixels pass whose faces look alike.
 //!
 //! Looks are kept in bytes. Where the bytes of several faces lie close together, all pairs of these faces look alike.
-//! Where they do not, the looks themselves are compared.
+//! The looks themselves are compared where bytes lie farther apart.
 
 use super::look::{ALIKE, Look, kinds};
 use crate::backend::cpu::geometry::samples::NOTHING;
