@@ -54,9 +54,11 @@ struct Frame {
     vertices_at: u32,
     items_at: u32,
     pixels_at: u32,
+    // How far from a pixel's samples the middle of a tinted line is that touches the pixel, at most, 1/256 px; 0 where
+    // layers tint no line.
+    tint_reach: f32,
     padding_a: u32,
     padding_b: u32,
-    padding_c: u32,
 };
 
 // Parameters of a dispatch: its triangles, vertices or edges, and the rows of the picture that the
@@ -150,6 +152,8 @@ const INSIDE_OUT: u32 = 64u;
 const HOLES: u32 = 128u;
 // Rims alone are drawn, and the pixels that they reach marked.
 const RIM_PASS: u32 = 256u;
+// Layers tint the lines.
+const TINTED_PASS: u32 = 512u;
 
 const SURFACE: u32 = 1u;
 const HULL: u32 = 2u;

@@ -8,8 +8,10 @@
 // Peeled layers per sample.
 @group(1) @binding(27) var<storage, read> peel_state: array<PeelState>;
 // Per pixel, the surface over nothing or, where a line is, the finished colour so far; over.wgsl
-// tells them apart. Then, per pixel, the light on the pass's lines.
+// tells them apart. Then, per pixel, the light on the pass's lines, and what tints.wgsl says.
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
+// Per pixel, a face; then, per pixel, the depth of the pass's nearest line, where layers tint it.
+@group(1) @binding(11) var<storage, read_write> owners: array<u32>;
 // Strokes per pixel, as stroke_words.wgsl lays them out.
 @group(1) @binding(12) var<storage, read_write> strokes: array<u32>;
 // Per pass.
@@ -34,6 +36,11 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
         colors[i] = flip_alpha_sign(background_at(i));
     }
     let at = STROKE_WORDS * i;
+    var depth = 0.0;
+    if (batch.line_flags & TINTED_PASS) != 0u {
+        depth = bitcast<f32>(owners[batch.count + i]);
+        owners[batch.count + i] = 0u;
+    }
     var by_holes = false;
     if has(HOLED) && (batch.line_flags & HOLES) != 0u {
         let marks = strokes[at + HOLE_WORD] & (MARKED | STROKED);
@@ -70,12 +77,29 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
         if (batch.line_flags & LIT_PASS) != 0u {
             color = lit_color(color, colors[batch.count + i].xy);
         }
+        if (batch.line_flags & TINTED_PASS) != 0u {
+            color = tinted(i, depth, color);
+        }
         colors[i] = flip_alpha_sign(rn4(cover * color) + rn4(under * (1.0 - rn(cover * color.w))));
     }
     // For the next pass.
     for (var w = 0u; w < STROKE_WORDS; w++) {
         strokes[at + w] = 0u;
     }
+}
+
+// The colour (premultiplied) of a line in pixel i at this depth, with what lies in front of it. Its alpha is what it
+// hides: the layers in front of it are in the picture already.
+fn tinted(i: u32, depth: f32, color: vec4<f32>) -> vec4<f32> {
+    let least = rn(depth * NEARER_RATIO);
+    let depths = colors[tint_depths_at(i)];
+    var front = vec4(0.0);
+    for (var layer = 0u; layer < TINTS; layer++) {
+        if depths[layer] > least {
+            front += colors[tint_at(i, layer)];
+        }
+    }
+    return vec4(rn3((1.0 - front.w) * color.xyz) + rn3(color.w * front.xyz), color.w);
 }
 
 // Sum of the areas of the strokes at `at`, two words.

@@ -13,7 +13,8 @@
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
 // Two vertices, two faces.
 @group(1) @binding(10) var<storage, read> edges: array<vec4<u32>>;
-// Per pixel, the face that lights the pass's lines, plus 1.
+// Per pixel, the face that lights the pass's lines, plus 1; then, per pixel, the depth of its nearest line, where layers
+// tint the pass.
 @group(1) @binding(11) var<storage, read_write> owners: array<atomic<u32>>;
 // Strokes per pixel, as stroke_words.wgsl lays them out.
 @group(1) @binding(12) var<storage, read_write> strokes: array<atomic<u32>>;
@@ -58,6 +59,8 @@ struct Waiting {
     at: u32,
     // The face that lights the line, plus 1, where it is lit.
     face: u32,
+    // The depth in the point of the part that is nearest to the pixel's centre.
+    depth: f32,
 };
 
 // Strokes that wait until there is one for each thread. At most 31 wait before each thread adds one, so 64
@@ -338,6 +341,7 @@ fn window_of(s: Segment, share: u32) -> Window {
 // for each thread, they are drawn: that takes far longer than finding them.
 fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32>, thread: u32) {
     let is_lit = (batch.line_flags & LIT_PASS) != 0u;
+    let goes_on = (batch.line_flags & (LIT_PASS | TINTED_PASS)) != 0u;
     let start = point_at(s, interval.x);
     let end = point_at(s, interval.y);
     let reach = reach_of_line() + SLACK_PX;
@@ -353,9 +357,11 @@ fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32
         let pixel = vec2(low + i32(p % columns), window.first + i32(p / columns * batch.line_slices));
         let center = vec2<f32>(pixel) + 0.5;
         let at = u32((pixel.y - batch.row_first) * frame.width + pixel.x);
-        // A full pixel stays full. Only a lit line goes on, to find the face that lights it.
-        if p < pixels && touches(place_of(s.direction, start - center, end - center)) && owns(s, window, center)
-            && (!only_stroked() || is_stroked(at)) && (is_lit || !is_full(at)) {
+        let place = place_of(s.direction, start - center, end - center);
+        // A full pixel stays full. Only a line that is lit or tinted goes on, to find the face that lights it or the
+        // nearest of its depths.
+        if p < pixels && touches(place) && owns(s, window, center)
+            && (!only_stroked() || is_stroked(at)) && (goes_on || !is_full(at)) {
             if is_rim_pass() {
                 atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], point_marks());
             }
@@ -363,7 +369,9 @@ fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32
             if is_lit {
                 face = lighting_face(edge);
             }
-            waiting[atomicAdd(&waiting_count, 1u)] = Waiting(s.direction, start - center, end - center, at, face);
+            let nearest = interval.x + rn(place.past.x * s.inverse_length);
+            let depth = depth_of(s, min(max(nearest, interval.x), interval.y));
+            waiting[atomicAdd(&waiting_count, 1u)] = Waiting(s.direction, start - center, end - center, at, face, depth);
         }
         draw_waiting(LINE_THREADS, thread);
     }
@@ -386,8 +394,15 @@ fn draw_waiting(least: u32, thread: u32) {
     let stroke = waiting[count - 1u - min(thread, count - 1u)];
     // Before another thread puts a new one in its place.
     workgroupBarrier();
-    if thread < count && add_stroke(stroke.at, stroke.direction, stroke.start, stroke.end) && stroke.face > 0u {
-        atomicMax(&owners[stroke.at], stroke.face);
+    if thread < count && add_stroke(stroke.at, stroke.direction, stroke.start, stroke.end) {
+        if stroke.face > 0u {
+            atomicMax(&owners[stroke.at], stroke.face);
+        }
+        if (batch.line_flags & TINTED_PASS) != 0u {
+            // Numbers that are not negative are in the order of their bits.
+            let pixels = u32((batch.row_end - batch.row_first) * frame.width);
+            atomicMax(&owners[pixels + stroke.at], bitcast<u32>(stroke.depth));
+        }
     }
 }
 

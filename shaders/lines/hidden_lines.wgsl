@@ -4,9 +4,6 @@
 // The threads of a workgroup find the triangles and their intervals together. The CPU sorts the
 // intervals; here they are walked through in order.
 
-// Smallest ratio of a hiding surface's depth to the edge's: covers the rounding of f32.
-const NEARER_RATIO: f32 = 1.0000019073486328;
-
 // Largest position error on screen, 1/256 px: half a unit each for the snapping of a triangle and
 // of an edge, and some for f32.
 const SNAP_ERROR: f32 = 1.25;
@@ -18,8 +15,6 @@ const INTERVAL_MIN_PX: f32 = 0.0625;
 // Shortest visible interval between two hidden ones, pixels: a sliver of surface there may have no
 // sample.
 const GAP_MIN_PX: f32 = 0.25;
-
-const MIN_POSITIVE: f32 = 1.17549435e-38;
 
 // More than any place on an edge.
 const BEYOND: f32 = 2.0;
@@ -291,33 +286,11 @@ fn may_be_hidden_by(s: Segment, a: Vertex, b: Vertex, c: Vertex) -> bool {
 
 // Depth error of a triangle's plane due to snapping; -1 without area.
 fn slack_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>) -> f32 {
-    // So that nothing overflows, by exponents: 2^31.
-    let exponents = max(max(exponents_of(p), exponents_of(q)), exponents_of(r));
-    if any(exponents >= vec4(0x4F000000u)) {
+    if is_far(p, q, r) {
         return 0.0;
     }
-    let in_x = vec3(p.x, q.x, r.x);
-    let in_z = vec3(p.z, q.z, r.z);
-    let x = cofactors(vec3(p.y, q.y, r.y), vec3(p.w, q.w, r.w));
-    let y = cofactors(vec3(p.w, q.w, r.w), in_x);
-    let volume = abs(sum3(rn3(x * in_x)));
-    if volume > MIN_POSITIVE {
-        return rn(rn((abs(sum3(rn3(x * in_z))) + abs(sum3(rn3(y * in_z)))) * recip(volume)) * SNAP_ERROR);
-    }
-    return -1.0;
-}
-
-fn exponents_of(p: vec4<f32>) -> vec4<u32> {
-    return bitcast<vec4<u32>>(p) & vec4(0x7F800000u);
-}
-
-// Per corner, a x b of the other two corners.
-fn cofactors(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
-    return rn3(a.yzx * b.zxy) - rn3(b.yzx * a.zxy);
-}
-
-fn sum3(v: vec3<f32>) -> f32 {
-    return rn(v.x + v.y) + v.z;
+    let steep = steepness(p, q, r);
+    return select(steep, rn(steep * SNAP_ERROR), steep >= 0.0);
 }
 
 // Per side of a triangle, twice the area that it spans with a point; positive inside.

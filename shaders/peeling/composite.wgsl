@@ -6,6 +6,8 @@
 @group(1) @binding(27) var<storage, read_write> peel_state: array<PeelState>;
 // Per layer: 1 if there may be another behind it.
 @group(1) @binding(28) var<storage, read_write> peel_rounds: array<atomic<u32>>;
+// As tints.wgsl says.
+@group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
 
 @compute @workgroup_size(WORKGROUP)
 fn composite(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -25,9 +27,13 @@ fn composite(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgro
         flag_pending(u32(sample_count()) * i, u32(sample_count()));
         return;
     }
+    if batch.layer == 0u && keeps_tints() {
+        colors[tint_depths_at(i)] = vec4(0.0);
+    }
     let show = Show(!has(WIRES_ONLY), select(frame.layer_fade, 1.0, batch.layer == 0u), 1.0);
     if sample_count() == 1 {
-        accumulate(i, group_color(single_sample_group(take_layer(i)), pixel, show));
+        let group = single_sample_group(take_layer(i));
+        add_group(i, i, group, group_color(group, pixel, show));
         flag_pending(i, 1u);
         return;
     }
@@ -40,12 +46,7 @@ fn composite(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgro
     while left != 0u {
         let group = first_group(first, left);
         left &= ~group.same;
-        let color = group_color(group, pixel, show);
-        for (var s = 0; s < sample_count(); s++) {
-            if ((group.same >> u32(s)) & 1u) != 0u {
-                accumulate(first + u32(s), color);
-            }
-        }
+        add_group(i, first, group, group_color(group, pixel, show));
     }
     flag_pending(first, u32(sample_count()));
 }
@@ -78,14 +79,74 @@ fn take_layer(sample: u32) -> u32 {
     return id;
 }
 
-// Composites a colour under a sample's other layers.
-fn accumulate(sample: u32, color: vec4<f32>) {
+// Composites the colour of a group under the other layers of its samples, in pixel i with this first sample.
+fn add_group(i: u32, first: u32, group: Group, color: vec4<f32>) {
+    let depth = bitcast<f32>(peel_state[first + firstTrailingBit(group.same)].previous.y);
+    // How many samples of it remain under the colours so far.
+    var seen = 0.0;
+    for (var s = 0; s < sample_count(); s++) {
+        if ((group.same >> u32(s)) & 1u) != 0u {
+            seen += accumulate(first + u32(s), color);
+        }
+    }
+    if keeps_tints() && group.id != NOTHING {
+        add_tint(i, group.id, depth, rn4(color * (seen * (1.0 / f32(sample_count())))));
+    }
+}
+
+// Adds a triangle of this layer to pixel i: what it adds to the pixel's colour, and its depth at one of its samples.
+fn add_tint(i: u32, id: u32, depth: f32, color: vec4<f32>) {
+    if color.w <= ALPHA_MIN {
+        return;
+    }
+    var farthest = MIN_POSITIVE;
+    let steep = steepness_of(id);
+    if steep >= 0.0 {
+        farthest = max(depth - rn(steep * frame.tint_reach), MIN_POSITIVE);
+    }
+    var sum = color;
+    let layer = min(batch.layer, TINTS - 1u);
+    let before = colors[tint_depths_at(i)][layer];
+    if before != 0.0 {
+        farthest = min(before, farthest);
+        sum = colors[tint_at(i, layer)] + color;
+    }
+    colors[tint_depths_at(i)][layer] = farthest;
+    colors[tint_at(i, layer)] = sum;
+}
+
+// The steepness of a triangle; -1 also where it reaches far.
+fn steepness_of(id: u32) -> f32 {
+    let a = vertices[triangles[3u * id]];
+    let b = vertices[triangles[3u * id + 1u]];
+    let c = vertices[triangles[3u * id + 2u]];
+    var p = vec4(f32(a.x), f32(a.y), a.z, 1.0);
+    var q = vec4(f32(b.x), f32(b.y), b.z, 1.0);
+    var r = vec4(f32(c.x), f32(c.y), c.z, 1.0);
+    if a.x == OUTSIDE || b.x == OUTSIDE || c.x == OUTSIDE {
+        if id >= frame.triangle_count || !has(CLIPPED) {
+            return -1.0;
+        }
+        p = homogeneous(corner_position(id, 0u));
+        q = homogeneous(corner_position(id, 1u));
+        r = homogeneous(corner_position(id, 2u));
+    }
+    if is_far(p, q, r) {
+        return -1.0;
+    }
+    return steepness(p, q, r);
+}
+
+// Composites a colour under a sample's other layers. Returns the share of it that remains under them.
+fn accumulate(sample: u32, color: vec4<f32>) -> f32 {
     let so_far = peel_state[sample].color;
-    let sum = so_far + rn4((1.0 - so_far.w) * color);
+    let rest = 1.0 - so_far.w;
+    let sum = so_far + rn4(rest * color);
     peel_state[sample].color = sum;
     if sum.w >= 1.0 {
         peel_state[sample].previous = vec2(0u);
     }
+    return rest;
 }
 
 // Sets the round's flag if any of some samples may have another layer.

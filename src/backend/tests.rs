@@ -11,7 +11,7 @@ use std::mem::offset_of;
 use wgpu::naga;
 
 use super::cpu::geometry::transform::{GUARD, OUTSIDE, ScreenVertex};
-use super::cpu::geometry::{clip, samples};
+use super::cpu::geometry::{clip, samples, steepness};
 use super::cpu::lines::holes::{self, inset, tips};
 use super::cpu::lines::{coverage, hidden_lines, profile, segment, stroke};
 use super::cpu::mixed::find::breaks;
@@ -20,7 +20,6 @@ use super::cpu::mixed::find::thin;
 use super::cpu::mixed::thinness;
 use super::cpu::mixed::{points, triangle};
 use super::cpu::occlusion;
-use super::cpu::peeling::state as peel_state;
 use super::cpu::surface::{light, texture};
 use super::gpu::params::{Batch, FACES_BACK, FACES_BOTH, FACES_FRONT, Frame, OWN_TRIANGLES, line_flags};
 use super::gpu::pipelines::{Access, Kernel, SampleTarget, SampleWrite, Slot, key};
@@ -30,8 +29,8 @@ use super::gpu::schedule::sizes::{
 use super::gpu::schedule::{PIECES_MAX, WORKGROUP, line_shares, tiles};
 use super::sample_partition::{GENERATORS, POINTS};
 use crate::plan::{
-    Edge, HullVertex, LinePass, ShadedMaterial, TAPS_PER_PIXEL, TEXTURE_NONE, Texture, debug_views, flags, pass_mask,
-    sample_offsets, samplers, slots,
+    ALPHA_MIN, Edge, HullVertex, LinePass, ShadedMaterial, TAPS_PER_PIXEL, TEXTURE_NONE, TINTS, Texture, debug_views,
+    flags, pass_mask, sample_offsets, samplers, slots,
 };
 
 /// Every constant that a shader and Rust both have, as the shader calls it.
@@ -53,7 +52,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
         WIRES_ONLY PEELED_HULL DERIVATIVE_NORMALS VERTEX_COLORS UVS TEXTURES WIRE_MINIMUM WIRE_LIT DEBUG VARYING ADAPTIVE);
     // Line flags, pass masks, faces.
     add_same!("", line_flags: SHOWN_VISIBLE SHOWN_HIDDEN SKIP_BACK CONTOUR LIT_PASS FIRST_PASS INSIDE_OUT HOLES
-        RIM_PASS);
+        RIM_PASS TINTED_PASS);
     add!(
         "PASS_LAYER" = pass_mask::LAYER,
         "PASS_FRONT_ONLY" = pass_mask::FRONT_ONLY,
@@ -91,8 +90,8 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
         "BOX_RADIUS" = std::f32::consts::FRAC_1_SQRT_2,
         "SLACK_PX" = segment::SLACK_PX
     );
-    add!("STROKES_SIDE_BY_SIDE" = coverage::STROKES_SIDE_BY_SIDE, "ALPHA_MIN" = peel_state::ALPHA_MIN);
-    add!("NEARER_RATIO" = hidden_lines::NEARER_RATIO, "SNAP_ERROR" = hidden_lines::SNAP_ERROR);
+    add!("STROKES_SIDE_BY_SIDE" = coverage::STROKES_SIDE_BY_SIDE, "ALPHA_MIN" = ALPHA_MIN, "TINTS" = TINTS);
+    add!("NEARER_RATIO" = steepness::NEARER_RATIO, "SNAP_ERROR" = hidden_lines::SNAP_ERROR);
     add!("INTERVAL_MIN_PX" = hidden_lines::INTERVAL_MIN_PX, "GAP_MIN_PX" = hidden_lines::GAP_MIN_PX);
     add!("IDS_MAX" = line_shares::IDS_MAX, "INTERVALS_MAX" = line_shares::INTERVALS_MAX);
     add!("LINE_THREADS" = line_shares::LINE_THREADS);
@@ -284,7 +283,7 @@ fn layouts() -> Vec<(&'static str, Layout)> {
                 near_w ambient lamp_count zero width height triangle_count vertex_count masks_at material_count layer_fade
                 hull_color_count image_count normal_triangles_at uv_triangles_at color_triangles_at
                 occlusion_depth occlusion_spread taps occlusion_reach second_uvs_at vertices_at items_at pixels_at
-                padding_a padding_b padding_c
+                tint_reach padding_a padding_b
             }),
         ),
         (

@@ -70,7 +70,13 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
     // edges than the surface.
     let of_mesh = pass_masks.iter().take(scene.mesh.triangles.len());
     let is_one_surface = is_mesh_alone && of_mesh.into_iter().all(|&mask| mask == pass_mask::SURFACE);
-    lines.iter_mut().for_each(|pass| pass.is_complete &= is_one_surface);
+    // Not the ground: its shadow lies over no line that is seen from above.
+    let of_layers = pass_masks.iter().rev().skip(ground_count).any(|mask| mask & pass_mask::LAYER != 0);
+    let is_tinting = of_layers && peeling.is_some_and(|pass| !pass.wires_only);
+    for pass in &mut lines {
+        pass.is_complete &= is_one_surface;
+        pass.is_tinted &= is_tinting;
+    }
     let is_unclipped = cx.skips.skip(
         SkipKind::Clipping,
         camera.contains_mesh,

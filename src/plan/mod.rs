@@ -39,7 +39,7 @@ pub use framing::framing;
 pub use heat::Legend;
 pub use lines::{Edge, LinePass, Shown, Side};
 pub use outline::{HullPass, HullVertex};
-pub use peeling::{PeelingPass, pass_mask};
+pub use peeling::{ALPHA_MIN, PeelingPass, TINTS, pass_mask};
 pub use prepared::{MeshToken, Prepared};
 pub use projection::Projection;
 pub use quality::{QualitySelection, SelectedSpec, select_quality};

@@ -10,6 +10,14 @@ use crate::spec::{Cull, Hidden};
 /// Layers that are peeled off per sample. What lies behind the last of them is not drawn.
 const LAYERS_MAX: u32 = 16;
 
+/// Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent
+/// pictures.
+pub const ALPHA_MIN: f32 = 1e-4;
+
+/// Layers that tint the lines behind them and are told apart. All from the last of these on count as one, as far away as the
+/// farthest of them.
+pub const TINTS: usize = 4;
+
 /// The share of their colour that fading hidden lines keep.
 pub const FADE: f32 = 0.25;
 

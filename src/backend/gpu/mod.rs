@@ -40,8 +40,8 @@ use self::recorder::Recorder;
 use self::residents::{Found, Source};
 use self::schedule::Schedule;
 use self::schedule::sizes::{
-    DeviceTraits, OWNER_BYTES, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, is_painted,
-    occlusion_bytes, samples, work_bytes,
+    DeviceTraits, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, is_painted,
+    occlusion_bytes, owner_bytes, samples, work_bytes,
 };
 use self::schedule::step::{Band, Goal, Step};
 use self::stage_clock::StageClock;
@@ -436,8 +436,8 @@ fn upload_shading(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedul
         buffers.upload(gpu, Slot::SampleMasks, bytemuck::cast_slice(&sample_masks(plan.samples)))?;
         buffers.reserve(gpu, Slot::Strokes, band_pixels * STROKES_BYTES)?;
         buffers.reserve(gpu, Slot::Progress, schedule.progress_bytes)?;
-        if plan.lights_lines() {
-            buffers.reserve(gpu, Slot::Owners, band_pixels * OWNER_BYTES)?;
+        if owner_bytes(plan) > 0 {
+            buffers.reserve(gpu, Slot::Owners, band_pixels * owner_bytes(plan))?;
         }
     }
     buffers.upload(&gpu.handles, Slot::Thresholds, bytemuck::cast_slice(&srgb8_thresholds()))?;
@@ -548,8 +548,8 @@ fn clear_band(
     if schedule.goal == Goal::Picture && !plan.lines.is_empty() {
         let pixels = u64::from(plan.width_px) * u64::from(schedule.banding.rows);
         recorder.clear(Slot::Strokes, pixels * STROKES_BYTES)?;
-        if plan.lights_lines() {
-            recorder.clear(Slot::Owners, pixels * OWNER_BYTES)?;
+        if owner_bytes(plan) > 0 {
+            recorder.clear(Slot::Owners, pixels * owner_bytes(plan))?;
         }
     }
     Ok(())

@@ -49,9 +49,9 @@ pub struct Frame {
     pub vertices_at: u32,
     pub items_at: u32,
     pub pixels_at: u32,
+    pub tint_reach: f32,
     pub padding_a: u32,
     pub padding_b: u32,
-    pub padding_c: u32,
 }
 
 /// An image as shaders/surface/texture.wgsl reads it: four vectors of two words.
@@ -143,9 +143,11 @@ pub mod line_flags {
     pub const HOLES: u32 = 128;
     /// Rims alone are drawn, and the pixels that they reach marked.
     pub const RIM_PASS: u32 = 256;
+    /// Layers tint the lines.
+    pub const TINTED_PASS: u32 = 512;
 
     /// The bits of a pass; [`FIRST_PASS`], [`HOLES`] and [`RIM_PASS`] aside.
-    pub fn of(lines: &LinePass, something_hides: bool, lights_lines: bool) -> u32 {
+    pub fn of(lines: &LinePass, something_hides: bool, lights_lines: bool, tints_lines: bool) -> u32 {
         let when = |condition: bool, flag: u32| if condition { flag } else { 0 };
         // Without a surface nothing hides a line, and there is no visibility buffer to read.
         let shown = match lines.shown {
@@ -159,6 +161,7 @@ pub mod line_flags {
             | when(lines.contour, CONTOUR)
             | when(lines.lit && lights_lines, LIT_PASS)
             | when(lines.unseen_side == Some(Side::Front), INSIDE_OUT)
+            | when(lines.is_tinted && tints_lines, TINTED_PASS)
     }
 }
 
@@ -195,6 +198,7 @@ impl Frame {
             frame.hull_color = hull.color(0);
             frame.hull_color_count = hull.colors.len() as u32;
         }
+        frame.tint_reach = plan.tint_reach();
         frame.layer_fade = plan.peeling().map_or(1.0, |layers| layers.fade);
         frame
     }

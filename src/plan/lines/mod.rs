@@ -40,6 +40,8 @@ pub struct LinePass {
     /// True if the surface's light changes the line's colour. It does not where no surface is
     /// visible.
     pub lit: bool,
+    /// True if the plan's layers tint lines that lie behind them.
+    pub is_tinted: bool,
 }
 
 impl LinePass {
@@ -130,6 +132,18 @@ impl DrawPlan<'_> {
             && lines.smoothing_px == 0.0
             && LinePass::holes_width_px(self.samples).contains(&lines.width_px)
             && self.surface.as_ref().is_some_and(is_whole)
+    }
+
+    /// True if layers tint any line.
+    pub fn tints_lines(&self) -> bool {
+        self.tint_reach() > 0.0
+    }
+
+    /// How far from a pixel's samples the middle of a tinted line is that touches the pixel, at most, 1/256 px. 0 if
+    /// layers tint no line.
+    pub fn tint_reach(&self) -> f32 {
+        let tinted = self.lines.iter().filter(|lines| lines.is_tinted && self.peeling().is_some());
+        tinted.map(|lines| 256.0 * (lines.reach_px() + 1.0)).fold(0.0, f32::max)
     }
 
     /// True if any line is lit and there is a visible surface to take the light from.

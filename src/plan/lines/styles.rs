@@ -109,6 +109,7 @@ impl LineStyle {
             unseen_side: unseen_side.filter(|_| self.hidden == Hidden::Hide),
             contour: self.contour,
             lit: self.lit,
+            is_tinted: self.hidden != Hidden::Show && shown != Shown::Hidden,
         };
         match self.hidden {
             Hidden::Show => vec![pass(Shown::All, self.color)],

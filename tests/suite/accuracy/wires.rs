@@ -40,6 +40,7 @@ pub fn line_plan<'a>(positions: &'a [[f32; 3]], edges: &[[u32; 2]], width_px: f3
         unseen_side: None,
         contour: false,
         lit: false,
+        is_tinted: false,
     };
     let plan = scenes::screen_plan([SIZE_PX; 2], 4, 1.0, positions, &[]);
     DrawPlan { surface: None, lines: vec![pass], background: [0.0; 4], ..plan }

@@ -168,9 +168,16 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
         scratch.strokes.reset(pixels);
         scratch.owners.clear();
         scratch.owners.resize(lit_pixels, 0);
+        let is_tinted = pass.is_tinted && plan.peeling().is_some();
+        scratch.line_depths.clear();
+        scratch.line_depths.resize(if is_tinted { pixels } else { 0 }, 0.0);
         find_holes(context, pass, (&bins.triangles, band), &scratch.samples, &mut scratch.holes);
-        let target =
-            &mut LineTarget { strokes: &mut scratch.strokes, owners: &mut scratch.owners, holes: &mut scratch.holes };
+        let target = &mut LineTarget {
+            strokes: &mut scratch.strokes,
+            owners: &mut scratch.owners,
+            depths: &mut scratch.line_depths,
+            holes: &mut scratch.holes,
+        };
         draw_edges(context.isa, context, pass, edges, band, (&scratch.samples, &mut scratch.farthest), target);
         find_points(context, pass, &scratch.samples, &scratch.holes, (&mut scratch.strokes, &mut scratch.owners));
         if lit_pixels > 0 {
@@ -180,7 +187,8 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
         scratch.light.resize(lit_pixels, Light::NONE);
         line_light::light_lines(context, &scratch.samples, &scratch.owners, &mut scratch.light);
         let covered = (&scratch.strokes, &scratch.holes);
-        composite(context.isa, &compositor, pass, covered, &scratch.light, &mut scratch.colors);
+        let seen = (&scratch.light[..], &scratch.line_depths[..]);
+        composite(context.isa, &compositor, pass, covered, seen, &mut scratch.colors);
     }
 }
 

@@ -8,6 +8,7 @@ use crate::backend::cpu::lines::farthest::Farthest;
 use crate::backend::cpu::lines::holes::Holes;
 use crate::backend::cpu::mixed::draw::MixedScratch;
 use crate::backend::cpu::peeling::state::PeelBand;
+use crate::backend::cpu::peeling::tints::Tints;
 use crate::backend::cpu::surface::flat::FlatColors;
 use crate::backend::cpu::surface::light::Light;
 use crate::plan::DrawPlan;
@@ -119,9 +120,10 @@ fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
     let coverage = if plan.lines.is_empty() { 0 } else { BandStrokes::PIXEL_BYTES };
     let holes = if plan.has_holes() { Holes::row_bytes(plan.width_px) } else { 0 };
     let peel = if plan.peeling().is_some() { PeelBand::SAMPLE_BYTES } else { 0 };
+    let tints = if plan.tints_lines() { Tints::PIXEL_BYTES + size_of::<f32>() } else { 0 };
     // A plan of flat faces alone needs no colours of pixels.
     let color = if plan.lines.is_empty() && FlatColors::suffice(plan) { 0 } else { size_of::<[f32; 4]>() };
-    plan.width_px as usize * (color + light + coverage) + holes + samples(plan.width_px) * peel
+    plan.width_px as usize * (color + light + coverage + tints) + holes + samples(plan.width_px) * peel
 }
 
 /// A band's buffers, kept from band to band.
@@ -150,6 +152,8 @@ pub struct BandScratch {
     pub owners: Vec<u32>,
     /// Per pixel, the light on its lines.
     pub light: Vec<Light>,
+    /// Per pixel, where layers tint the pass: the depth of its nearest line; 0 where it has none.
+    pub line_depths: Vec<f32>,
 }
 
 impl BandScratch {
@@ -167,6 +171,7 @@ impl BandScratch {
             mixed: MixedScratch::default(),
             owners: Vec::new(),
             light: Vec::new(),
+            line_depths: Vec::new(),
         }
     }
 
@@ -191,6 +196,7 @@ impl BandScratch {
             + self.mixed.bytes()
             + self.owners.capacity() * size_of::<u32>()
             + self.light.capacity() * size_of::<Light>()
+            + self.line_depths.capacity() * size_of::<f32>()
     }
 }
 
@@ -302,6 +308,7 @@ mod tests {
             unseen_side: None,
             contour: false,
             lit: false,
+            is_tinted: false,
         };
         let plan = DrawPlan::new(size_px, &[], &[], projection);
         DrawPlan { samples: 4, lines: vec![pass; passes], ..plan }

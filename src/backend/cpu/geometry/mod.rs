@@ -3,7 +3,7 @@
 //! [`transform`] moves vertices to snapped screen coordinates, [`clip`] cuts what reaches behind
 //! the eye, [`visibility`] finds the samples of a triangle ([`batch`] those of eight small ones), and
 //! [`nearest`] keeps the nearest of them in the buffer of [`samples`]. [`tiles`] tell what lies
-//! behind them. Integers and single roundings decide everything here, so that
+//! behind them, [`steepness`] how fast depth changes. Integers and single roundings decide everything here, so that
 //! both back-ends agree on every sample. Twins are in `shaders/geometry/`.
 
 pub(crate) mod batch;
@@ -15,6 +15,7 @@ pub(crate) mod clip;
 pub(crate) mod nearest;
 pub(crate) mod samples;
 pub(crate) mod setups;
+pub(crate) mod steepness;
 pub(crate) mod tiles;
 pub(crate) mod transform;
 pub(crate) mod visibility;

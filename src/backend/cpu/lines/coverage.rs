@@ -12,11 +12,11 @@ use super::stroke::{Amount, Mask, POINTS, WORDS, count};
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::recip;
 use crate::backend::cpu::isa::dispatch;
-use crate::backend::cpu::peeling::state::{ALPHA_MIN, PeelBand};
+use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::resolve::{is_composited, over_background};
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::sample_partition::sample_partition;
-use crate::plan::{DrawPlan, LinePass};
+use crate::plan::{ALPHA_MIN, DrawPlan, LinePass};
 
 /// The mask of a pixel without strokes.
 const NO_POINTS: Mask = [0; WORDS];
@@ -245,12 +245,13 @@ impl<'a> LineCompositor<'a> {
 }
 
 dispatch! {
-    /// Composites the lines of a pass over the colours. `light` is empty where they are not lit.
+    /// Composites the lines of a pass over the colours. Their light is empty where they are not lit, their depths
+    /// where layers do not tint them.
     pub fn composite(
         compositor: &LineCompositor<'_>,
         lines: &LinePass,
         covered: (&BandStrokes, &Holes),
-        light: &[Light],
+        seen: (&[Light], &[f32]),
         colors: &mut [[f32; 4]],
     ) = composite_kernel
 }
@@ -260,7 +261,7 @@ fn composite_kernel(
     compositor: &LineCompositor<'_>,
     lines: &LinePass,
     (strokes, holes): (&BandStrokes, &Holes),
-    light: &[Light],
+    (light, depths): (&[Light], &[f32]),
     colors: &mut [[f32; 4]],
 ) {
     let peak = lines.peak();
@@ -277,7 +278,10 @@ fn composite_kernel(
                 let surface = compositor.uncovered(i, *c, mask, lines.color[3] * peak);
                 over_background(surface, compositor.background(i))
             };
-            let color = light.get(i).map_or(lines.color, |light| light.on_premultiplied(lines.color));
+            let mut color = light.get(i).map_or(lines.color, |light| light.on_premultiplied(lines.color));
+            if let (Some(&depth), Some(peel)) = (depths.get(i), compositor.peel) {
+                color = peel.tints.tinted(i, depth, color);
+            }
             *c = std::array::from_fn(|k| cover * color[k] + under[k] * (1.0 - cover * color[3]));
             c[3] = -c[3];
         }

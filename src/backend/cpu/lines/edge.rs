@@ -8,7 +8,7 @@
 use super::farthest::Farthest;
 use super::holes::Holes;
 use super::segment::{PixelBox, SLACK_PX, Segment, rows};
-use super::stroke::{self, Direction, Mask, Pen, Places};
+use super::stroke::{self, Direction, Mask, Pen, Place, Places};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::recip;
@@ -23,8 +23,23 @@ pub struct LineTarget<'a> {
     pub strokes: &'a mut BandStrokes,
     /// Per pixel, the face that lights its lines, plus 1; empty where no lines are lit.
     pub owners: &'a mut [u32],
+    /// Per pixel, the depth of its nearest line; empty where no layers tint lines.
+    pub depths: &'a mut [f32],
     /// The pass's holes. If there are any, only some pixels get strokes.
     pub holes: &'a mut Holes,
+}
+
+impl LineTarget<'_> {
+    /// Notes what lights a pixel's line, if something does, and how deep the line is.
+    #[inline(always)]
+    pub fn note(&mut self, at: usize, owner: u32, depth: f32) {
+        if owner > 0 {
+            self.owners[at] = self.owners[at].max(owner);
+        }
+        if let Some(nearest) = self.depths.get_mut(at) {
+            *nearest = nearest.max(depth);
+        }
+    }
 }
 
 /// Draws the edges of a pass into a band.
@@ -114,11 +129,11 @@ impl<'a> LineDrawer<'a> {
             }
             let window = Window { segment: &segment, ends: [a, b], number: window, count: windows };
             for i in 0..self.intervals.len() {
-                let piece = self.intervals[i].map(|t| segment.point(t));
+                let piece = Piece::new(&segment, self.intervals[i]);
                 if self.context.is_plain {
-                    self.draw_piece_plainly(&window, piece, owner, target);
+                    self.draw_piece_plainly(&window, &piece, owner, target);
                 } else {
-                    self.draw_piece(&window, piece, owner, target);
+                    self.draw_piece(&window, &piece, owner, target);
                 }
             }
         }
@@ -160,7 +175,11 @@ impl<'a> LineDrawer<'a> {
 
     /// Draws a piece of an edge into the pixels that the window owns.
     #[inline(always)]
-    fn draw_piece(&mut self, window: &Window<'_>, [a, b]: [[f32; 2]; 2], owner: u32, target: &mut LineTarget<'_>) {
+    fn draw_piece(&mut self, window: &Window<'_>, piece: &Piece, owner: u32, target: &mut LineTarget<'_>) {
+        let [a, b] = piece.ends;
+        // A full pixel stays full. Only a line that is lit or tinted goes on, to find the face that lights it or the
+        // nearest of its depths.
+        let goes_on = owner > 0 || !target.depths.is_empty();
         let width_px = self.band.size_px[0];
         let area = Footprint::new(window, [a, b], self.pen.reach);
         let [first, last] = area.rows(self.rows);
@@ -177,9 +196,7 @@ impl<'a> LineDrawer<'a> {
                     let l = touched.trailing_zeros() as usize % LANES;
                     touched &= touched - 1;
                     let (at, center) = (row + x as usize + l, [centers[0] + l as f32, centers[1]]);
-                    // A full pixel stays full. Only a lit line goes on, to find the face that
-                    // lights it.
-                    if (owner == 0 && target.strokes.is_full(at))
+                    if (!goes_on && target.strokes.is_full(at))
                         || !window.owns(center)
                         || !self.may_draw(at, target.holes)
                     {
@@ -187,11 +204,10 @@ impl<'a> LineDrawer<'a> {
                     }
                     let ends = [[a[0] - center[0], a[1] - center[1]], [b[0] - center[0], b[1] - center[1]]];
                     let mut mask = Mask::default();
-                    if let Some(amount) = stroke::cover(&self.pen, &self.direction, ends, &places.of(l), &mut mask) {
+                    let place = places.of(l);
+                    if let Some(amount) = stroke::cover(&self.pen, &self.direction, ends, &place, &mut mask) {
                         target.strokes.add(at, amount, &mask, self.pen.peak);
-                        if owner > 0 {
-                            target.owners[at] = target.owners[at].max(owner);
-                        }
+                        target.note(at, owner, piece.depth(window.segment, &place));
                     }
                 }
                 x += LANES as i32;
@@ -224,9 +240,31 @@ impl<'a> LineDrawer<'a> {
     }
 }
 
+/// A piece of an edge.
+pub(super) struct Piece {
+    /// The interval of the edge, 0 to 1.
+    range: [f32; 2],
+    /// Its ends on screen, pixels from the picture's upper left corner.
+    pub(super) ends: [[f32; 2]; 2],
+}
+
+impl Piece {
+    #[inline(always)]
+    fn new(segment: &Segment, range: [f32; 2]) -> Self {
+        Self { range, ends: range.map(|t| segment.point(t)) }
+    }
+
+    /// The depth in the point of the piece that is nearest to a pixel's centre.
+    #[inline(always)]
+    pub(super) fn depth(&self, segment: &Segment, place: &Place) -> f32 {
+        let t = self.range[0] + place.past_start() * segment.inverse_length;
+        segment.depth(t.max(self.range[0]).min(self.range[1]))
+    }
+}
+
 /// A piece of an edge, and the pixels whose centres are nearest to it.
 pub(super) struct Window<'a> {
-    segment: &'a Segment,
+    pub(super) segment: &'a Segment,
     ends: [[f32; 2]; 2],
     number: u32,
     count: u32,

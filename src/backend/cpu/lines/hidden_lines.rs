@@ -12,21 +12,16 @@ use super::segment::Segment;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::is_moderate;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
+use crate::backend::cpu::geometry::steepness::{Corner, NEARER_RATIO, corner, is_far, steepness};
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, recip};
 use crate::backend::cpu::geometry::visibility::area;
 use crate::plan::Edge;
-
-/// Smallest ratio of a hiding surface's depth to the edge's: covers the rounding of f32.
-pub const NEARER_RATIO: f32 = 1.0 + 1.0 / 524_288.0;
 
 /// Largest position error on screen, 1/256 px: half a unit each for the snapping of a triangle and
 /// of an edge, and some for f32. A surface hides an edge only if it is nearer even when moved this
 /// far down its slope. Otherwise rounding would decide whether edges in its plane are hidden, such
 /// as the foot of an object that stands on it.
 pub const SNAP_ERROR: f32 = 1.25;
-
-/// Corners behind the eye may lie anywhere: 2^31.
-const FAR: f32 = 2_147_483_648.0;
 
 /// Shortest visible interval, pixels. Shorter ones come from rounding, and their round ends would
 /// show as dots.
@@ -186,9 +181,6 @@ impl HiddenIntervals {
     }
 }
 
-/// A corner on screen, times its W: X, Y, Z, W.
-type Corner = [f32; 4];
-
 /// Interval of the edge that the triangle hides.
 #[inline(always)]
 pub(super) fn hidden_by(context: &RasterContext<'_>, edge: &Edge, segment: &Segment, id: u32) -> Option<[f32; 2]> {
@@ -249,23 +241,10 @@ pub(super) fn hidden_by(context: &RasterContext<'_>, edge: &Edge, segment: &Segm
     Some([range[0] + interval[0] * length, range[0] + interval[1] * length])
 }
 
-/// Depth error of a triangle's plane due to snapping; None without area. Depth is `z = gx x + gy y
-/// + c` for all corners, times W: Cramer's rule.
+/// Depth error of a triangle's plane due to snapping; None without area.
 #[inline(always)]
 fn slack(corners: &[Corner; 3]) -> Option<f32> {
-    // Prevents overflow; beyond this f32 is coarser than the snapping.
-    if corners.iter().flatten().any(|v| v.abs() >= FAR) {
-        return Some(0.0);
-    }
-    let [p, q, r] = corners;
-    let cofactors = |i: usize, j: usize| {
-        let cofactor = |a: &Corner, b: &Corner| a[i] * b[j] - a[j] * b[i];
-        [cofactor(q, r), cofactor(r, p), cofactor(p, q)]
-    };
-    let (x, y) = (cofactors(1, 3), cofactors(3, 0));
-    let sum = |c: [f32; 3], k: usize| (c[0] * p[k] + c[1] * q[k]) + c[2] * r[k];
-    let volume = sum(x, 0).abs();
-    (volume > f32::MIN_POSITIVE).then(|| (sum(x, 2).abs() + sum(y, 2).abs()) * recip(volume) * SNAP_ERROR)
+    if is_far(corners) { Some(0.0) } else { Some(steepness(corners)? * SNAP_ERROR) }
 }
 
 /// Per side of a triangle, twice the area that it spans with a point; positive inside. Valid for
@@ -279,11 +258,6 @@ fn sides(corners: &[Corner; 3], [x, y]: [f32; 2], is_clockwise: bool) -> [f32; 3
         if is_clockwise { side } else { -side }
     };
     [side(b, c), side(c, a), side(a, b)]
-}
-
-#[inline(always)]
-fn corner(v: &ScreenVertex) -> Corner {
-    [v.x as f32, v.y as f32, v.z, 1.0]
 }
 
 /// Cuts a range down to where the affine function with these values at 0 and 1 is positive.

@@ -1,8 +1,8 @@
 //! Lines without any shortcut, for tests that compare pictures: hidden-line removal examines every
 //! triangle that is visible along an edge, one by one, and strokes look at every pixel around them.
 
-use super::edge::{LineDrawer, LineTarget, Window};
-use super::hidden_lines::{HiddenIntervals, NEARER_RATIO, hidden_by};
+use super::edge::{LineDrawer, LineTarget, Piece, Window};
+use super::hidden_lines::{HiddenIntervals, hidden_by};
 use super::holes::inset::Insets;
 use super::holes::tips::TipRange;
 use super::holes::{Holes, half_width, looked_at, marks_of_hidden};
@@ -12,6 +12,7 @@ use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::setups::Corners;
+use crate::backend::cpu::geometry::steepness::NEARER_RATIO;
 use crate::backend::cpu::isa::{Isa, LANES};
 use crate::plan::{Edge, LinePass};
 
@@ -128,10 +129,11 @@ impl LineDrawer<'_> {
     pub(super) fn draw_piece_plainly(
         &mut self,
         window: &Window<'_>,
-        [a, b]: [[f32; 2]; 2],
+        piece: &Piece,
         owner: u32,
         target: &mut LineTarget<'_>,
     ) {
+        let [a, b] = piece.ends;
         let width_px = self.band.size_px[0];
         let reach = self.pen.reach + 1.0;
         let columns = [a[0].min(b[0]) - reach, a[0].max(b[0]) + reach];
@@ -147,9 +149,7 @@ impl LineDrawer<'_> {
                 let mut mask = Mask::default();
                 if let Some(amount) = stroke::cover(&self.pen, &self.direction, ends, &place, &mut mask) {
                     target.strokes.add(at, amount, &mask, self.pen.peak);
-                    if owner > 0 {
-                        target.owners[at] = target.owners[at].max(owner);
-                    }
+                    target.note(at, owner, piece.depth(window.segment, &place));
                 }
             }
         }

@@ -243,6 +243,12 @@ impl Place {
         Self { across, past: [past(start), past(end)] }
     }
 
+    /// Distance past the piece's start, pixels.
+    #[inline(always)]
+    pub fn past_start(&self) -> f32 {
+        self.past[0]
+    }
+
     /// Distance past the nearer end.
     #[inline(always)]
     fn beyond(&self) -> f32 {

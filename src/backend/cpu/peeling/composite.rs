@@ -26,9 +26,11 @@ pub fn draw(
     colors: &mut [[f32; 4]],
 ) {
     peel.reset(base);
+    peel.tints.begin(context.plan);
     let floor = (!pass.behind_surface).then_some(base);
     for layer in 0..pass.count_max {
         peel.begin_round(floor);
+        peel.tints.begin_round(colors.len());
         peel_layer(context.isa, context, bins, peel);
         let show = Show { fill: !pass.wires_only, wires: if layer == 0 { 1.0 } else { pass.fade } };
         let mut is_open = false;
@@ -132,13 +134,32 @@ fn shade_layer_sampled<const S: usize>(
                     continue;
                 };
                 let first = first + i * S;
-                let each = |same, color| peel.accumulate(first, same, color);
+                let pixel = (y - peel.found.shown[0]) as usize * width as usize + left as usize + i;
+                let each = |same: [bool; S], color| add_group(context, peel, pixel, (first, ids, same), color);
                 shader.groups((ids, None), [left + i as u32, y], |_| show, each);
                 for s in 0..S {
                     *is_open |= peel.previous.depth[first + s] > 0.0;
                 }
             }
         }
+    }
+}
+
+/// Adds a triangle of a layer to a pixel whose first sample is given, with the layer's triangles and the samples that
+/// show this one.
+#[inline(always)]
+fn add_group<const S: usize>(
+    context: &RasterContext<'_>,
+    peel: &mut PeelBand,
+    pixel: usize,
+    (first, ids, same): (usize, [u32; S], [bool; S]),
+    color: [f32; 4],
+) {
+    let s = same.iter().position(|&is| is).unwrap_or(0);
+    let (id, depth) = (ids[s], peel.previous.depth[first + s]);
+    let seen = peel.accumulate(first, same, color);
+    if peel.tints.are_kept() && id != NOTHING {
+        peel.tints.add(context, pixel, (id, depth), color.map(|v| v * (seen * (1.0 / S as f32))));
     }
 }
 

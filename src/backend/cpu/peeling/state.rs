@@ -1,10 +1,8 @@
 //! Stage shade, per sample: the state of depth peeling. Twin of `shaders/peeling/state.wgsl`.
 
+use super::tints::Tints;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
-
-/// Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent
-/// pictures.
-pub const ALPHA_MIN: f32 = 1e-4;
+use crate::plan::ALPHA_MIN;
 
 /// Depth peeling of a band: buffers for the rows that are shown, without the margin rows.
 pub struct PeelBand {
@@ -18,6 +16,8 @@ pub struct PeelBand {
     pub materials: Vec<u32>,
     /// Per triangle of the band, in the order of its bins: true if a later round may find it.
     pub pending: Vec<bool>,
+    /// The layers of each pixel, where they tint lines.
+    pub tints: Tints,
 }
 
 impl PeelBand {
@@ -29,12 +29,12 @@ impl PeelBand {
         let like = || SampleBand::new(base.size_px, 0, rows, base.samples);
         let (found, previous) = (like(), like());
         let (colors, materials) = (vec![[0.0; 4]; found.depth.len()], vec![0; found.depth.len()]);
-        Self { found, previous, colors, materials, pending: Vec::new() }
+        Self { found, previous, colors, materials, pending: Vec::new(), tints: Tints::default() }
     }
 
     /// Allocated memory, bytes.
     pub fn bytes(&self) -> usize {
-        self.colors.len() * Self::SAMPLE_BYTES + self.pending.capacity()
+        self.colors.len() * Self::SAMPLE_BYTES + self.pending.capacity() + self.tints.bytes()
     }
 
     /// Alpha of the layers so far at a sample of pixel (x, y), 0 to 1.
@@ -138,12 +138,15 @@ impl PeelBand {
         Some(id)
     }
 
-    /// Composites a colour under the colours so far of some samples of the pixel at `first`.
+    /// Composites a colour under the colours so far of some samples of the pixel at `first`. Returns how many samples of
+    /// it remain under the colours so far.
     #[inline(always)]
-    pub fn accumulate<const S: usize>(&mut self, first: usize, same: [bool; S], color: [f32; 4]) {
+    pub fn accumulate<const S: usize>(&mut self, first: usize, same: [bool; S], color: [f32; 4]) -> f32 {
+        let mut seen = 0.0;
         for s in (0..S).filter(|&s| same[s]) {
             let so_far = &mut self.colors[first + s];
             let rest = 1.0 - so_far[3];
+            seen += rest;
             for k in 0..4 {
                 so_far[k] += rest * color[k];
             }
@@ -151,5 +154,6 @@ impl PeelBand {
                 self.previous.depth[first + s] = 0.0;
             }
         }
+        seen
     }
 }

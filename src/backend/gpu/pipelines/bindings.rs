@@ -237,6 +237,7 @@ const COMPOSITE: &[Binding] = &[
     (Slot::PeelLayer, Read),
     (Slot::PeelState, ReadWrite),
     (Slot::PeelRounds, ReadWrite),
+    (Slot::Colors, ReadWrite),
 ];
 
 const SHADE: &[Binding] = &[
@@ -310,6 +311,7 @@ const COVERAGE: &[Binding] = &[
     (Slot::Vertices, Read),
     (Slot::Samples, Read),
     (Slot::Colors, ReadWrite),
+    (Slot::Owners, ReadWrite),
     (Slot::Strokes, ReadWrite),
     (Slot::LineColors, Read),
     (Slot::PeelState, Read),

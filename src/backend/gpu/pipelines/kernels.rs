@@ -26,6 +26,8 @@ const SAMPLES_32: &str = include_str!("../../../../shaders/samples/samples32.wgs
 const SAMPLES_64: &str = include_str!("../../../../shaders/samples/samples64.wgsl");
 const SAMPLES: &str = include_str!("../../../../shaders/samples/samples.wgsl");
 const PEEL_STATE: &str = include_str!("../../../../shaders/peeling/state.wgsl");
+const TINTS: &str = include_str!("../../../../shaders/peeling/tints.wgsl");
+const STEEPNESS: &str = include_str!("../../../../shaders/geometry/steepness.wgsl");
 const EMIT: &str = include_str!("../../../../shaders/samples/emit.wgsl");
 const EMIT_LAYER: &str = include_str!("../../../../shaders/peeling/emit_layer.wgsl");
 const ENCODE: &str = include_str!("../../../../shaders/encode.wgsl");
@@ -156,7 +158,14 @@ impl Kernel {
             Self::Composite => [
                 &[TRIANGLE],
                 SHADE,
-                &[HULL, GROUP, PEEL_STATE, include_str!("../../../../shaders/peeling/composite.wgsl")],
+                &[
+                    HULL,
+                    GROUP,
+                    PEEL_STATE,
+                    TINTS,
+                    STEEPNESS,
+                    include_str!("../../../../shaders/peeling/composite.wgsl"),
+                ],
             ]
             .concat()
             .concat(),
@@ -182,11 +191,24 @@ impl Kernel {
             }
             Self::Edge => {
                 let kernel = include_str!("../../../../shaders/lines/edge.wgsl");
-                [TRIANGLE, PLANES, CONTOUR, SEGMENT, SEEN, HIDDEN_LINES, STROKE_WORDS, LATTICE, STROKE, kernel].concat()
+                [
+                    TRIANGLE,
+                    PLANES,
+                    STEEPNESS,
+                    CONTOUR,
+                    SEGMENT,
+                    SEEN,
+                    HIDDEN_LINES,
+                    STROKE_WORDS,
+                    LATTICE,
+                    STROKE,
+                    kernel,
+                ]
+                .concat()
             }
             Self::Coverage => {
                 let kernel = include_str!("../../../../shaders/lines/coverage.wgsl");
-                [OVER, STROKE_WORDS, SEEN, INSET, LATTICE, FREE_POINTS, PEEL_STATE, MIXED_PLACE, kernel].concat()
+                [OVER, STROKE_WORDS, SEEN, INSET, LATTICE, FREE_POINTS, PEEL_STATE, TINTS, MIXED_PLACE, kernel].concat()
             }
             Self::Resolve => [OVER, ENCODE, include_str!("../../../../shaders/resolve.wgsl")].concat(),
         }
@@ -257,7 +279,7 @@ impl Kernel {
             Self::VisibilityFew { .. } => key::SAMPLES | key::PASS_MASKS | key::GANG,
             Self::Paint => SHADED | key::GANG,
             Self::VisibilityTile { target: SampleTarget::Layer, .. } => key::SAMPLES | key::BEHIND_SURFACE,
-            Self::Composite => SHADED | key::PEELED_HULL,
+            Self::Composite => SHADED | key::PEELED_HULL | key::LINES,
             Self::Grid | Self::Gather => key::SAMPLES | key::GANG,
             Self::Shade => SHADED | key::PEELING | key::OCCLUSION | key::GANG,
             Self::LineLight => SHADED,

@@ -3,7 +3,7 @@
 use super::step::Goal;
 use crate::backend::DrawError;
 use crate::backend::sample_partition::POINTS;
-use crate::plan::DrawPlan;
+use crate::plan::{DrawPlan, TINTS};
 
 /// Largest buffer that holds a band of the picture, bytes.
 const BAND_BYTES: u64 = 64 << 20;
@@ -31,8 +31,9 @@ pub const SAMPLE_BYTES: u64 = 8;
 /// points, the most that an area differs from its points', and the area of holes.
 pub const STROKES_BYTES: u64 = 52;
 
-/// Bytes per pixel of lit lines: the face that lights them.
-pub const OWNER_BYTES: u64 = 4;
+/// Bytes per pixel of the face that lights lines, and of the depth of those that layers tint.
+const OWNER_BYTES: u64 = 4;
+const DEPTH_BYTES: u64 = 4;
 
 /// Bytes at the start of the buffer of mixed pixels: their number, and what shaders/mixed/place.wgsl says.
 pub const MIXED_HEAD_BYTES: u64 = 16;
@@ -148,8 +149,8 @@ impl Banding {
     pub fn bytes(&self, plan: &DrawPlan<'_>) -> u64 {
         let seen = if has_visibility(plan) { self.seen_samples(plan) * SAMPLE_BYTES } else { 0 };
         let layers = if plan.peeling().is_some() { PEEL_STATE_BYTES + SAMPLE_BYTES } else { 0 };
-        let (strokes, owners) = if plan.lines.is_empty() { (0, 0) } else { (STROKES_BYTES, OWNER_BYTES) };
-        let pixel = u64::from(plan.samples) * layers + color_bytes(plan) + strokes + owners + RGBA_BYTES;
+        let strokes = if plan.lines.is_empty() { 0 } else { STROKES_BYTES };
+        let pixel = u64::from(plan.samples) * layers + color_bytes(plan) + strokes + owner_bytes(plan) + RGBA_BYTES;
         let seen = seen + self.mixed_bytes(plan) + self.points_bytes(plan) + self.lists_bytes(plan);
         seen + u64::from(plan.width_px) * u64::from(self.rows) * pixel
     }
@@ -234,10 +235,24 @@ pub fn samples(plan: &DrawPlan<'_>, rows: u32) -> u64 {
     u64::from(plan.width_px) * u64::from(rows) * u64::from(plan.samples)
 }
 
-/// Bytes per pixel of colours: the surface's, then everything's, and the light on lines where they
-/// are lit.
+/// Bytes per pixel of colours: the surface's, then everything's, the light on lines where they are lit, and what tints
+/// them (shaders/peeling/tints.wgsl).
 pub fn color_bytes(plan: &DrawPlan<'_>) -> u64 {
-    if plan.lights_lines() { 32 } else { 16 }
+    let vectors = match () {
+        _ if plan.tints_lines() => 2 + TINTS + TINTS.div_ceil(4),
+        _ if plan.lights_lines() => 2,
+        _ => 1,
+    };
+    16 * vectors as u64
+}
+
+/// Bytes per pixel of what is known of its nearest line.
+pub fn owner_bytes(plan: &DrawPlan<'_>) -> u64 {
+    match () {
+        _ if plan.tints_lines() => OWNER_BYTES + DEPTH_BYTES,
+        _ if plan.lights_lines() => OWNER_BYTES,
+        _ => 0,
+    }
 }
 
 /// Bytes of a work list.

@@ -46,6 +46,7 @@ pub fn lines(edges: Arc<Vec<Edge>>, width_px: f32, shown: Shown) -> LinePass {
         unseen_side: None,
         contour: false,
         lit: true,
+        is_tinted: true,
     }
 }
 

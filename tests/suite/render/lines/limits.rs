@@ -145,6 +145,7 @@ fn lines_of<'a>(
         unseen_side: None,
         contour: false,
         lit: false,
+        is_tinted: false,
     };
     let passes = [Shown::Visible, Shown::Hidden, Shown::All].map(|shown| LinePass { shown, ..pass.clone() });
     plan.lines = passes.to_vec();

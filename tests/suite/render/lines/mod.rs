@@ -8,3 +8,4 @@ pub mod looks;
 pub mod points;
 pub mod primitives;
 pub mod shortcuts;
+pub mod tinted;

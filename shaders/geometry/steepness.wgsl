@@ -1,0 +1,38 @@
+// The slope of a triangle's depth on screen, given its corners times their W. Twin of
+// src/backend/cpu/geometry/steepness.rs.
+
+const MIN_POSITIVE: f32 = 1.17549435e-38;
+
+// True if a triangle reaches so far that sums of its coordinates might overflow, and f32 is coarser there than the
+// snapping of corners: by exponents, 2^31.
+fn is_far(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>) -> bool {
+    let exponents = max(max(exponents_of(p), exponents_of(q)), exponents_of(r));
+    return any(exponents >= vec4(0x4F000000u));
+}
+
+fn exponents_of(p: vec4<f32>) -> vec4<u32> {
+    return bitcast<vec4<u32>>(p) & vec4(0x7F800000u);
+}
+
+// Change of a triangle's depth per 1/256 px to the right plus that per 1/256 px down, both positive; -1 without area.
+// Not for triangles that reach far.
+fn steepness(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>) -> f32 {
+    let in_x = vec3(p.x, q.x, r.x);
+    let in_z = vec3(p.z, q.z, r.z);
+    let x = cofactors(vec3(p.y, q.y, r.y), vec3(p.w, q.w, r.w));
+    let y = cofactors(vec3(p.w, q.w, r.w), in_x);
+    let volume = abs(sum3(rn3(x * in_x)));
+    if volume > MIN_POSITIVE {
+        return rn((abs(sum3(rn3(x * in_z))) + abs(sum3(rn3(y * in_z)))) * recip(volume));
+    }
+    return -1.0;
+}
+
+// Per corner, a x b of the other two corners.
+fn cofactors(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
+    return rn3(a.yzx * b.zxy) - rn3(b.yzx * a.zxy);
+}
+
+fn sum3(v: vec3<f32>) -> f32 {
+    return rn(v.x + v.y) + v.z;
+}
