@@ -57,8 +57,9 @@ struct Frame {
     // How far from a pixel's samples the middle of a tinted line is that touches the pixel, at most, 1/256 px; 0 where
     // layers tint no line.
     tint_reach: f32,
+    // 1 if triangles may be shaded in each quarter of a pixel, else 0.
+    has_quarters: u32,
     padding_a: u32,
-    padding_b: u32,
 };
 
 // Parameters of a dispatch: its triangles, vertices or edges, and the rows of the picture that the

@@ -42,7 +42,8 @@ fn color_pixel(i: u32, thread: u32) {
     let own = own_points(thread, is_few);
     for (var p = own.x; p < POINTS; p += own.y) {
         if is_first(p) {
-            parts[p] = share_color(~seen[p].x, at, share_of(p, is_few), bitcast<f32>(seen[p].y));
+            let depth = depth_of_share(p, select(1u, FEW_STEP, is_few));
+            parts[p] = share_color(~seen[p].x, at, share_of(p, is_few), depth);
         }
     }
     workgroupBarrier();

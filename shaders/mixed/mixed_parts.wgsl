@@ -59,14 +59,18 @@ fn write_parts(number: u32, thread: u32) {
     }
     let first = workgroupUniformLoad(&part_first);
     if first != LIST_END && has_sets && thread < length {
-        let p = first_of_set(thread);
-        if p < POINTS {
-            write_part(first, p, at, share_of_set(thread, is_few));
+        let depth = seen[min(first_of_set(thread, WHOLE), POINTS - 1u)].y;
+        let quarters = quarters_of_set(thread);
+        for (var q = quarters.x; q <= quarters.y; q++) {
+            let p = first_of_set(thread, q);
+            if p < POINTS {
+                write_part(first, p, at, share_of_set(thread, q, is_few), depth);
+            }
         }
     }
     for (var p = own.x; first != LIST_END && !has_sets && p < POINTS; p += own.y) {
         if is_first(p) {
-            write_part(first, p, at, share_of(p, is_few));
+            write_part(first, p, at, share_of(p, is_few), bitcast<u32>(depth_of_share(p, own.y)));
         }
     }
     if has(LINES) && thread < BORDER_WORDS {
@@ -74,10 +78,10 @@ fn write_parts(number: u32, thread: u32) {
     }
 }
 
-// Writes the part of the triangle that p is the first point of, given the pixel's first part.
-fn write_part(first: u32, p: u32, at: u32, share: Share) {
+// Writes the part of the triangle that p is the first point of, given the pixel's first part and the triangle's depth.
+fn write_part(first: u32, p: u32, at: u32, share: Share, depth: u32) {
     let part = part_at(first + firsts_before(p));
-    lists[part] = vec4(~seen[p].x, at, bitcast<u32>(share.weight), seen[p].y);
+    lists[part] = vec4(~seen[p].x, at, bitcast<u32>(share.weight), depth);
     lists[part + 1u] = vec4(bitcast<vec2<u32>>(share.mean), 0u, 0u);
 }
 

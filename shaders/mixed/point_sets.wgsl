@@ -10,6 +10,9 @@ var<workgroup> digit_sets: array<u32, DIGIT_WORDS>;
 const SETS_WORDS: u32 = WORKGROUP * FIRSTS_WORDS;
 const DIGIT_WORDS: u32 = 8u * FIRSTS_WORDS;
 
+// In place of the number of a quarter: the whole pixel. Quarters are left and right, above and below.
+const WHOLE: u32 = 4u;
+
 // Finds the points whose rows have each digit: a word by each thread.
 fn find_digit_sets(thread: u32) {
     var word = 0u;
@@ -46,10 +49,30 @@ fn add_point(item: u32, p: u32) {
     }
 }
 
-// The lowest point of an item's set; POINTS if it is empty.
-fn first_of_set(item: u32) -> u32 {
+// A word of an item's set in a quarter. Columns are the numbers of points.
+fn set_word(item: u32, w: u32, quarter: u32) -> u32 {
+    let word = atomicLoad(&sets[item * FIRSTS_WORDS + w]);
+    if quarter == WHOLE {
+        return word;
+    }
+    let lower = digit_sets[7u * FIRSTS_WORDS + w];
+    let is_right = w >= FIRSTS_WORDS / 2u;
+    return select(0u, word & select(~lower, lower, quarter >= 2u), is_right == ((quarter & 1u) != 0u));
+}
+
+// The first and the last number of the quarters in which an item is shaded; both WHOLE where it is shaded once.
+fn quarters_of_set(item: u32) -> vec2<u32> {
+    let p = first_of_set(item, WHOLE);
+    if p < POINTS && is_quartered(~seen[p].x) {
+        return vec2(0u, WHOLE - 1u);
+    }
+    return vec2(WHOLE);
+}
+
+// The lowest point of an item's set in a quarter; POINTS if there is none.
+fn first_of_set(item: u32, quarter: u32) -> u32 {
     for (var w = 0u; w < FIRSTS_WORDS; w++) {
-        let word = atomicLoad(&sets[item * FIRSTS_WORDS + w]);
+        let word = set_word(item, w, quarter);
         if word != 0u {
             return 32u * w + firstTrailingBit(word);
         }
@@ -57,22 +80,25 @@ fn first_of_set(item: u32) -> u32 {
     return POINTS;
 }
 
-// Notes the first point of each item, one by each thread.
+// Notes the first point of each item, or of each of its quarters: an item by each thread.
 fn find_firsts_of_sets(thread: u32, length: u32) {
     if thread < length {
-        let p = first_of_set(thread);
-        if p < POINTS {
-            atomicOr(&firsts[p / 32u], 1u << (p % 32u));
+        let quarters = quarters_of_set(thread);
+        for (var q = quarters.x; q <= quarters.y; q++) {
+            let p = first_of_set(thread, q);
+            if p < POINTS {
+                atomicOr(&firsts[p / 32u], 1u << (p % 32u));
+            }
         }
     }
 }
 
-// The share of an item's points.
-fn share_of_set(item: u32, is_few: bool) -> Share {
+// The share of an item's points in a quarter.
+fn share_of_set(item: u32, quarter: u32, is_few: bool) -> Share {
     var count = 0u;
     var sums = vec2(0u);
     for (var w = 0u; w < FIRSTS_WORDS; w++) {
-        let word = atomicLoad(&sets[item * FIRSTS_WORDS + w]);
+        let word = set_word(item, w, quarter);
         let in_word = countOneBits(word);
         count += in_word;
         // Columns are the numbers of points.

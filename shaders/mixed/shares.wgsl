@@ -28,10 +28,11 @@ fn find_firsts(thread: u32, is_few: bool) {
     workgroupBarrier();
 }
 
-// True if no point before p sees its triangle.
+// True if no point before p sees its triangle; none in the same quarter, where each is shaded.
 fn is_first_of_all(p: u32, step: u32) -> bool {
+    let is_divided = is_quartered(~seen[p].x);
     for (var q = p % step; q < p; q += step) {
-        if seen[q].x == seen[p].x && seen[q].y != 0u {
+        if seen[q].x == seen[p].x && seen[q].y != 0u && (!is_divided || are_in_one_quarter(p, q)) {
             return false;
         }
     }
@@ -60,18 +61,35 @@ fn firsts_before(p: u32) -> u32 {
     return count;
 }
 
-// The share of the triangle that p is the first point of.
+// The share of the triangle that p is the first point of, or its share in a quarter.
 fn share_of(p: u32, is_few: bool) -> Share {
     let step = select(1u, FEW_STEP, is_few);
+    let is_divided = is_quartered(~seen[p].x);
     var count = 0;
     var places = vec2(0);
     for (var q = p; q < POINTS; q += step) {
-        if seen[q].x == seen[p].x && seen[q].y != 0u {
+        if seen[q].x == seen[p].x && seen[q].y != 0u && (!is_divided || are_in_one_quarter(p, q)) {
             count++;
             places += 2 * point_place(q) + 1;
         }
     }
     return Share(f32(count) / f32(POINTS / step), rn2(vec2<f32>(places) * recip(f32(2 * count))));
+}
+
+// The depth of the triangle that p sees, at the first point that sees it.
+fn depth_of_share(p: u32, step: u32) -> f32 {
+    var q = p;
+    if is_quartered(~seen[p].x) {
+        q = p % step;
+        while q < p && (seen[q].x != seen[p].x || seen[q].y == 0u) {
+            q += step;
+        }
+    }
+    return bitcast<f32>(seen[q].y);
+}
+
+fn are_in_one_quarter(p: u32, q: u32) -> bool {
+    return all(point_place(p) >> vec2(7u) == point_place(q) >> vec2(7u));
 }
 
 // A word of the points that see something, for lines over the pixel; none if all do.

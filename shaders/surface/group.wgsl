@@ -21,11 +21,15 @@ fn seen_samples(first: u32) -> u32 {
     return mask;
 }
 
-// The triangle that the first of the samples `left` sees, of the pixel whose first sample is given.
+// The triangle that the first of the samples `left` sees, of the pixel whose first sample is given; all of its samples, or
+// those in the same quarter of the pixel.
 fn first_group(first: u32, left: u32) -> Group {
     var g = Group(triangle_of_sample(first + firstTrailingBit(left)), 0u, 0, vec2(0));
+    let is_divided = has(ADAPTIVE) && g.id != NOTHING && is_quartered(g.id);
+    let quarter = sample_offset(i32(firstTrailingBit(left))) >> vec2(7u);
     for (var s = 0; s < sample_count(); s++) {
-        if triangle_of_sample(first + u32(s)) == g.id {
+        let is_in = !is_divided || all(sample_offset(s) >> vec2(7u) == quarter);
+        if is_in && triangle_of_sample(first + u32(s)) == g.id {
             g.same |= 1u << u32(s);
             g.count++;
             g.offset_sum += sample_offset(s);

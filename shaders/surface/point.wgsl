@@ -3,57 +3,7 @@
 
 // Three indices per triangle, for each kind of corner value that does not go by position.
 @group(1) @binding(7) var<storage, read> corner_triangles: array<u32>;
-// Triangles' materials, then edge masks, one byte each.
-@group(1) @binding(8) var<storage, read> attributes: array<u32>;
-@group(1) @binding(15) var<storage, read> materials: array<Material>;
 @group(1) @binding(19) var<storage, read> vertex_colors: array<vec4<f32>>;
-
-// src/plan/surface/mod.rs explains the fields.
-struct Material {
-    base_color: vec4<f32>,
-    emissive: vec3<f32>,
-    alpha_cutoff: f32,
-    wire_color: vec4<f32>,
-    wire_thickness: f32,
-    wire_smoothing: f32,
-    metallic: f32,
-    roughness: f32,
-    normal_scale: f32,
-    flags: u32,
-    opacity: f32,
-    facing_opacity: f32,
-    occlusion_strength: f32,
-    padding_a: u32,
-    padding_b: u32,
-    padding_c: u32,
-    // Five texture uses of eight words.
-    textures: array<vec4<u32>, 10>,
-};
-
-// Bits of a material's flags.
-const MATERIAL_FILL: u32 = 1u;
-const MATERIAL_FACE_NORMALS: u32 = 2u;
-const MATERIAL_DERIVATIVE_NORMALS: u32 = 4u;
-const MATERIAL_LIT: u32 = 14u;
-const MATERIAL_VERTEX_COLORS: u32 = 16u;
-const MATERIAL_MASK: u32 = 32u;
-const MATERIAL_BLEND: u32 = 64u;
-const MATERIAL_WIRE_BARYCENTRIC: u32 = 256u;
-const MATERIAL_WIRE_FWIDTH_MIN: u32 = 512u;
-const MATERIAL_WIRE_FWIDTH: u32 = 1024u;
-const MATERIAL_WIRES: u32 = 1920u;
-const MATERIAL_WIRE_LIT: u32 = 2048u;
-const MATERIAL_DEBUG_SHIFT: u32 = 12u;
-const MATERIAL_OWN_METALLIC: u32 = 32768u;
-const MATERIAL_OWN_ROUGHNESS: u32 = 65536u;
-const MATERIAL_BY_ANGLE: u32 = 131072u;
-
-// Places among a material's textures.
-const SLOT_BASE: u32 = 0u;
-const SLOT_METALLIC_ROUGHNESS: u32 = 1u;
-const SLOT_NORMAL: u32 = 2u;
-const SLOT_EMISSIVE: u32 = 3u;
-const SLOT_OCCLUSION: u32 = 4u;
 
 // Parts of a material that a point shows.
 struct Show {
@@ -150,13 +100,6 @@ fn dimmed(whole: Light, open: f32) -> Light {
         return Light(rn(whole.gain * open), rn(whole.gloss * open));
     }
     return whole;
-}
-
-fn material_index(id: u32) -> u32 {
-    if has(TRIANGLE_MATERIALS) {
-        return min(attributes[id], frame.material_count - 1u);
-    }
-    return 0u;
 }
 
 fn vertex_color(id: u32, b: Barycentrics) -> vec4<f32> {

@@ -41,7 +41,9 @@ fn uv_of(id: u32, b: Barycentrics, set_at: u32) -> Uv {
     let p = uvs[set_at + corner_triangles[first]];
     let q = uvs[set_at + corner_triangles[first + 1u]];
     let r = uvs[set_at + corner_triangles[first + 2u]];
-    return Uv(blend2(b.value, p, q, r), blend2(b.dx, p, q, r), blend2(b.dy, p, q, r));
+    // Width of what a point stands for: of a pixel, or of a quarter of one.
+    let share = select(1.0, 0.5, is_quartered(id));
+    return Uv(blend2(b.value, p, q, r), share * blend2(b.dx, p, q, r), share * blend2(b.dy, p, q, r));
 }
 
 // A material's use of a texture.

@@ -29,8 +29,8 @@ use super::gpu::schedule::sizes::{
 use super::gpu::schedule::{PIECES_MAX, WORKGROUP, line_shares, tiles};
 use super::sample_partition::{GENERATORS, POINTS};
 use crate::plan::{
-    ALPHA_MIN, Edge, HullVertex, LinePass, ShadedMaterial, TAPS_PER_PIXEL, TEXTURE_NONE, TINTS, Texture, debug_views,
-    flags, pass_mask, sample_offsets, samplers, slots,
+    ALPHA_MIN, Edge, HullVertex, LinePass, MIRROR_ROUGHNESS, ShadedMaterial, TAPS_PER_PIXEL, TEXTURE_NONE, TINTS,
+    Texture, debug_views, flags, pass_mask, sample_offsets, samplers, slots,
 };
 
 /// Every constant that a shader and Rust both have, as the shader calls it.
@@ -105,7 +105,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add_same!("BREAKS_", breaks: OWN LEFT UPPER THIN HARD);
     add_same!("", thinness: ASPECT HEIGHT_MAX LENGTH_MIN LENGTH_MAX);
     add_same!("", thin: SLACK);
-    add!("MIRROR_ROUGHNESS" = look::MIRROR_ROUGHNESS);
+    add!("MIRROR_ROUGHNESS" = MIRROR_ROUGHNESS);
     add!(
         "ALIKE" = look::ALIKE,
         "SLIGHT" = look::SLIGHT,
@@ -179,6 +179,7 @@ const SHADER_ONLY: &[&str] = &[
     "LIST_END",
     "LIST_MAX",
     "PARTS_OF_PIXEL",
+    "WHOLE",
     "STEP_NONE",
     "STEP_SLIGHT",
     "STEP_HARD",
@@ -283,7 +284,7 @@ fn layouts() -> Vec<(&'static str, Layout)> {
                 near_w ambient lamp_count zero width height triangle_count vertex_count masks_at material_count layer_fade
                 hull_color_count image_count normal_triangles_at uv_triangles_at color_triangles_at
                 occlusion_depth occlusion_spread taps occlusion_reach second_uvs_at vertices_at items_at pixels_at
-                tint_reach padding_a padding_b
+                tint_reach has_quarters padding_a
             }),
         ),
         (

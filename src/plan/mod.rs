@@ -47,8 +47,8 @@ pub use shared_slice::SharedSlice;
 pub use skips::{Skip, SkipKind};
 pub use surface::occlusion::{OcclusionPass, TAPS, TAPS_PER_PIXEL};
 pub use surface::{
-    CornerValues, Lamp, Lights, ShadedMaterial, SurfacePass, TEXTURE_NONE, TextureUse, debug_views, flags, samplers,
-    slots,
+    CornerValues, Lamp, Lights, MIRROR_ROUGHNESS, ShadedMaterial, SurfacePass, TEXTURE_NONE, TextureUse, debug_views,
+    flags, samplers, slots,
 };
 pub use uv_layout::{GRID_BYTES as UV_GRID_BYTES, UvLayout, overlapping as overlapping_uvs};
 pub use warnings::{is_out_of_view, out_of_view, undrawn_primitives, unknown_materials};
@@ -195,6 +195,13 @@ impl<'a> DrawPlan<'a> {
     /// True if some pixels may be drawn from coverage points.
     pub fn has_mixed(&self) -> bool {
         self.is_adaptive && self.is_shaded()
+    }
+
+    /// True if a face that is drawn from coverage points, or from samples beside them, may be shaded in each quarter of a
+    /// pixel.
+    pub fn has_quarters(&self) -> bool {
+        let is_any = |surface: &SurfacePass<'_>| surface.materials.iter().any(ShadedMaterial::is_quartered);
+        self.has_mixed() && self.surface.as_ref().is_some_and(is_any)
     }
 
     /// True if any sample gets a colour.

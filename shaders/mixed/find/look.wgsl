@@ -8,17 +8,14 @@ const SLIGHT: f32 = 0.25;
 // Added to normals, so that all values are above 0.
 const NORMAL_SHIFT: f32 = 1.5;
 
-// Factor of the normals of metals that mirror sharply, and the roughness from which on metals do not.
+// Factor of the normals of metals that mirror sharply.
 const MIRROR_SCALE: f32 = 256.0;
-const MIRROR_ROUGHNESS: f32 = 0.5;
 
 // The highest bits of a key: what its other bits say.
 const BY_NORMAL: u32 = 0x40000000u;
 const BY_COLOR: u32 = 0x80000000u;
 const UNIQUE: u32 = 0xC0000000u;
 
-const MATERIAL_VERTEX_NORMALS: u32 = 8u;
-const TEXTURE_NONE: u32 = 0xFFFFFFFFu;
 const TEXTURE_SLOTS: u32 = 5u;
 
 // Ranges of what decides the colours of a face. Faces with different keys never look alike.
@@ -160,10 +157,7 @@ fn shared_corners(start: u32, a: u32, b: u32) -> u32 {
 
 // The values of a normal.
 fn normal_values(m: u32, n: vec3<f32>, front: bool) -> vec3<f32> {
-    let may_be_smooth =
-        materials[m].roughness < MIRROR_ROUGHNESS || use_of(m, SLOT_METALLIC_ROUGHNESS).texture != TEXTURE_NONE;
-    let scale = select(1.0, MIRROR_SCALE, materials[m].metallic > 0.0 && may_be_smooth);
-    return scale * (turned_to_viewer(n, front) + NORMAL_SHIFT);
+    return select(1.0, MIRROR_SCALE, mirrors_sharply(m)) * (turned_to_viewer(n, front) + NORMAL_SHIFT);
 }
 
 fn own_material(id: u32) -> u32 {

@@ -89,6 +89,8 @@ pub struct RasterContext<'a> {
     flat: Option<&'a FlatColors>,
     /// The light that pixels go without, where they do.
     occlusion: Option<(&'a OcclusionPass, &'a Occlusion)>,
+    /// As [`DrawPlan::has_quarters`].
+    has_quarters: bool,
     /// As [`CpuRenderer::plain`].
     is_plain: bool,
 }
@@ -155,6 +157,7 @@ impl CpuRenderer {
             srgb: &self.srgb,
             flat: None,
             occlusion: None,
+            has_quarters: plan.has_quarters(),
             is_plain: self.is_plain,
         }
     }

@@ -50,8 +50,8 @@ pub struct Frame {
     pub items_at: u32,
     pub pixels_at: u32,
     pub tint_reach: f32,
+    pub has_quarters: u32,
     pub padding_a: u32,
-    pub padding_b: u32,
 }
 
 /// An image as shaders/surface/texture.wgsl reads it: four vectors of two words.
@@ -199,6 +199,7 @@ impl Frame {
             frame.hull_color_count = hull.colors.len() as u32;
         }
         frame.tint_reach = plan.tint_reach();
+        frame.has_quarters = u32::from(plan.has_quarters());
         frame.layer_fade = plan.peeling().map_or(1.0, |layers| layers.fade);
         frame
     }

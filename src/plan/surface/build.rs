@@ -17,7 +17,7 @@ use crate::plan::shared_slice::SharedSlice;
 use crate::plan::skips::SkipKind;
 use crate::plan::{CornerValues, Faces, PlanError, ShadedMaterial, SurfacePass, Textures, flags};
 use crate::scene::Scene;
-use crate::spec::{Cull, Layers};
+use crate::spec::{Cull, Layers, Samples};
 use crate::texture::fault_warnings;
 
 /// The pass that is filled, or only hides lines; None where the request needs neither.
@@ -93,7 +93,11 @@ fn materials_and_textures(
             materials::load_all(slot, &mut loader)?;
         }
     }
-    let projection = Projection::new(&scene.camera, scene.size_px(), true);
+    // A quarter of a pixel is half as wide.
+    let is_adaptive = scene.spec.image.samples == Samples::Adaptive;
+    let has_quarters = is_adaptive && materials.iter().any(ShadedMaterial::is_quartered);
+    let size_px = scene.size_px().map(|size| if has_quarters { 2 * size } else { size });
+    let projection = Projection::new(&scene.camera, size_px, true);
     let loaded = loader.finish(geometry, &projection, cx.prepared, &mut cx.skips)?;
     materials.iter_mut().for_each(|material| materials::remove_textures(material, mesh, &loaded.broken));
     cx.warnings.extend(fault_warnings(&loaded.faults));

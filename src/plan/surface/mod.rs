@@ -275,6 +275,26 @@ impl ShadedMaterial {
     }
 }
 
+/// Metals below this roughness mirror sharply: the lobe is narrow beside the windows that they mirror.
+pub const MIRROR_ROUGHNESS: f32 = 0.5;
+
+impl ShadedMaterial {
+    /// True if a metal may mirror so sharply that its light changes much with its normal.
+    #[inline(always)]
+    pub fn mirrors_sharply(&self) -> bool {
+        let may_be_smooth =
+            self.roughness < MIRROR_ROUGHNESS || self.textures[slots::METALLIC_ROUGHNESS].texture != TEXTURE_NONE;
+        self.metallic > 0.0 && may_be_smooth
+    }
+
+    /// True if adaptive samples shade it in each quarter of a pixel, because it mirrors sharply with normals that change
+    /// within a face.
+    #[inline(always)]
+    pub fn is_quartered(&self) -> bool {
+        self.flags & flags::VERTEX_NORMALS != 0 && self.mirrors_sharply()
+    }
+}
+
 impl<'a> SurfacePass<'a> {
     /// A surface of one material or several, without arrays, textures and lamps.
     pub fn new(faces: Faces, materials: Vec<ShadedMaterial>) -> Self {

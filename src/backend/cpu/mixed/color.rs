@@ -1,5 +1,5 @@
 //! Stage mixed, per pixel: its colour by what its points see. Each triangle is shaded once, at the mean of its points, and
-//! weighs its share of them.
+//! weighs its share of them; once in each quarter of the pixel, where it is of a metal that mirrors sharply.
 
 use std::ops::ControlFlow;
 
@@ -186,31 +186,52 @@ impl Painter<'_> {
         (i, pixel, own_z): (usize, [u32; 2], f32),
         colors: &mut [[f32; 4]],
     ) {
-        let plan = self.context.plan;
-        let size = [plan.width_px, plan.height_px];
         let mut is_of_surface = true;
         for share in shares.all() {
             is_of_surface &= !self.context.is_hull(share.id);
         }
-        for Share { id, points, depth } in shares.all() {
-            let count = points.count();
-            let weight = count as f32 / Lattice::<W>::POINTS as f32;
-            if let Some(color) = self.context.flat.and_then(|flat| flat.known(*id)) {
-                add(&mut colors[i], weight, color);
+        for share in shares.all() {
+            if !self.shader.is_quartered(share.id) {
+                self.paint_share(share, is_of_surface, (i, pixel, own_z), colors);
                 continue;
             }
-            let (place_sum, scale) = (points.place_sum(), recip((2 * count) as f32));
-            let mut at = [0.0; 2];
-            for k in 0..2 {
-                at[k] = (pixel[k] as i32 * 256 - size[k] as i32 * 128) as f32 + place_sum[k] as f32 * scale;
-            }
-            match &mut self.waiting {
-                Some(waiting) if is_of_surface => {
-                    let open = self.shader.open_share(pixel, *depth, own_z);
-                    waiting.push(Point { id: *id, at, weight, pixel: i as u32, open }, colors);
+            for points in share.points.quarters() {
+                if !points.is_empty() {
+                    let quarter = Share { points, ..*share };
+                    self.paint_share(&quarter, is_of_surface, (i, pixel, own_z), colors);
                 }
-                _ => add(&mut colors[i], weight, self.shader.at_point(*id, at, pixel, [*depth, own_z])),
             }
+        }
+    }
+
+    /// Adds what a triangle adds, or waits with that if all triangles of the pixel are of the surface.
+    #[inline(always)]
+    fn paint_share<const W: usize>(
+        &mut self,
+        Share { id, points, depth }: &Share<W>,
+        is_of_surface: bool,
+        (i, pixel, own_z): (usize, [u32; 2], f32),
+        colors: &mut [[f32; 4]],
+    ) {
+        let plan = self.context.plan;
+        let size = [plan.width_px, plan.height_px];
+        let count = points.count();
+        let weight = count as f32 / Lattice::<W>::POINTS as f32;
+        if let Some(color) = self.context.flat.and_then(|flat| flat.known(*id)) {
+            add(&mut colors[i], weight, color);
+            return;
+        }
+        let (place_sum, scale) = (points.place_sum(), recip((2 * count) as f32));
+        let mut at = [0.0; 2];
+        for k in 0..2 {
+            at[k] = (pixel[k] as i32 * 256 - size[k] as i32 * 128) as f32 + place_sum[k] as f32 * scale;
+        }
+        match &mut self.waiting {
+            Some(waiting) if is_of_surface => {
+                let open = self.shader.open_share(pixel, *depth, own_z);
+                waiting.push(Point { id: *id, at, weight, pixel: i as u32, open }, colors);
+            }
+            _ => add(&mut colors[i], weight, self.shader.at_point(*id, at, pixel, [*depth, own_z])),
         }
     }
 }

@@ -162,6 +162,14 @@ impl<const W: usize> PointSet<W> {
         sums
     }
 
+    /// Its points in each quarter of the pixel.
+    #[inline(always)]
+    pub fn quarters(self) -> [Self; 4] {
+        let [right, lower] = [0, 1].map(|axis| Lattice::<W>::DIGIT_SETS[axis][DIGITS - 1]);
+        let (left, right) = (self.without(right), self.and(right));
+        [left.without(lower), right.without(lower), left.and(lower), right.and(lower)]
+    }
+
     /// Calls `each` with the number of each point.
     #[inline(always)]
     pub fn for_each(self, mut each: impl FnMut(usize)) {

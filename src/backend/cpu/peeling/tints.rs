@@ -14,6 +14,8 @@ pub struct Tints {
     rounds: [Round; TINTS],
     /// The rounds so far that are told apart.
     count: usize,
+    /// The triangle that was added last, and its steepness.
+    last: Option<(u32, Option<f32>)>,
     /// How far from a pixel a line is that covers a part of it, at most, 1/256 px. 0 where no line asks.
     reach: f32,
 }
@@ -40,7 +42,7 @@ impl Tints {
 
     /// Forgets all layers, and takes on a plan.
     pub fn begin(&mut self, plan: &DrawPlan<'_>) {
-        (self.count, self.reach) = (0, plan.tint_reach());
+        (self.count, self.last, self.reach) = (0, None, plan.tint_reach());
     }
 
     /// Takes on the next layer of so many pixels, if a line asks.
@@ -71,7 +73,13 @@ impl Tints {
         if color[3] <= ALPHA_MIN {
             return;
         }
-        let farthest = match steepness_of(context, id) {
+        // Most neighbours show one triangle.
+        let steepness = match self.last {
+            Some((last, steepness)) if last == id => steepness,
+            _ => steepness_of(context, id),
+        };
+        self.last = Some((id, steepness));
+        let farthest = match steepness {
             Some(steepness) => (depth - steepness * self.reach).max(f32::MIN_POSITIVE),
             None => f32::MIN_POSITIVE,
         };

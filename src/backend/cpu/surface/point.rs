@@ -279,12 +279,19 @@ impl Points<'_> {
         self.material.textures[slot].texture != TEXTURE_NONE
     }
 
+    /// Width of what a point stands for: of a pixel, or of a quarter of one.
+    #[inline(always)]
+    fn footprint(&self) -> f32 {
+        if self.context.has_quarters && self.material.is_quartered() { 0.5 } else { 1.0 }
+    }
+
     /// Texels by slot; white where there is no texture.
     #[inline(always)]
     fn texels<const N: usize>(&self, place: &Place<'_, N>, is_textured: bool) -> [[[f32; N]; 4]; slots::COUNT] {
         let mut texels = [[[1.0; N]; 4]; slots::COUNT];
         let Some(uvs) = self.surface.uvs.as_ref().filter(|_| is_textured) else { return texels };
-        let first = Uv::new(&of_corners(uvs, &place.ids), &place.b);
+        let share = self.footprint();
+        let first = Uv::new(&of_corners(uvs, &place.ids), &place.b).narrowed(share);
         for (slot, texels) in texels.iter_mut().enumerate() {
             let is_light = [slots::METALLIC_ROUGHNESS, slots::NORMAL, slots::OCCLUSION].contains(&slot);
             if self.has_texture(slot) && (!is_light || self.material.flags & flags::LIT != 0) {
@@ -292,7 +299,7 @@ impl Points<'_> {
                 let uv = if used.sampler & samplers::SECOND_UVS == 0 {
                     first
                 } else {
-                    Uv::new(&uv_corners(self.surface, uvs, used, &place.ids), &place.b)
+                    Uv::new(&uv_corners(self.surface, uvs, used, &place.ids), &place.b).narrowed(share)
                 };
                 *texels = sample(self.context.isa, textures, used, samplers::taps_max(slot), &uv);
             }

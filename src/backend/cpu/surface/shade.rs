@@ -2,13 +2,14 @@
 //! `shaders/surface/shade.wgsl`.
 //!
 //! Samples of a pixel that see the same triangle are shaded once, at their mean position
-//! ([`point`](super::point)), and weigh their share.
+//! ([`point`](super::point)), and weigh their share. With adaptive samples, metals that mirror sharply are shaded once in
+//! each quarter of a pixel.
 
 use super::point::{PointShader, Show};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::recip;
-use crate::plan::sample_offsets;
+use crate::plan::{SurfacePass, sample_offsets};
 
 /// Shades pixels of a band.
 pub struct Shader<'a> {
@@ -16,12 +17,27 @@ pub struct Shader<'a> {
     context: &'a RasterContext<'a>,
     /// Shades their points.
     points: PointShader<'a>,
+    /// The surface, if some faces are shaded in each quarter of a pixel.
+    quartered: Option<&'a SurfacePass<'a>>,
 }
 
 impl<'a> Shader<'a> {
     /// One for a band.
     pub fn new(context: &'a RasterContext<'a>) -> Self {
-        Self { context, points: PointShader::new(context) }
+        let quartered = context.plan.surface.as_ref().filter(|_| context.has_quarters);
+        Self { context, points: PointShader::new(context), quartered }
+    }
+
+    /// True if some faces are shaded in each quarter of a pixel.
+    #[inline(always)]
+    pub fn has_quarters(&self) -> bool {
+        self.quartered.is_some()
+    }
+
+    /// True if a triangle is shaded in each quarter of a pixel.
+    #[inline(always)]
+    pub fn is_quartered(&self, id: u32) -> bool {
+        is_quartered(self.context, self.quartered, id)
     }
 
     /// The share of light that reaches a surface of depth `z` in a pixel whose first sample has the depth
@@ -50,7 +66,7 @@ impl<'a> Shader<'a> {
             ids[s] = band.ids[at + s];
             is_mixed |= ids[s] != ids[0];
         }
-        if !is_mixed {
+        if !is_mixed && !self.is_quartered(ids[0]) {
             self.points.open = self.open_share([x, y], band.depth[at], band.depth[at]);
             return self.group(ids[0], x, y, [128 * S as i32; 2], S as i32);
         }
@@ -73,9 +89,9 @@ impl<'a> Shader<'a> {
         sum
     }
 
-    /// Shades each triangle among a pixel's samples once, at the mean position of its samples, and
-    /// calls `each` with which samples these are, and its colour. The samples' depths tell the light that a
-    /// surface goes without; without them, all of it is there.
+    /// Shades each triangle among a pixel's samples once, at the mean position of its samples, or once in each quarter of
+    /// the pixel, and calls `each` with which samples these are, and its colour. The samples' depths tell the light that
+    /// a surface goes without; without them, all of it is there.
     #[inline(always)]
     pub fn groups<const S: usize>(
         &mut self,
@@ -84,12 +100,18 @@ impl<'a> Shader<'a> {
         show: impl Fn(u32) -> Show,
         mut each: impl FnMut([bool; S], [f32; 4]),
     ) {
-        for_each_triangle(&ids, |own, s, offset, count| {
+        let (context, quartered) = (self.context, self.quartered);
+        let mut shade = |own: u32, s: usize, offset, count, same| {
             self.points.show = show(own);
             self.points.open = depths.map_or(1.0, |depths| self.open_share([x, y], depths[s], depths[0]));
             let color = self.group(own, x, y, offset, count);
-            each(ids.map(|id| id == own), color);
-        });
+            each(same, color);
+        };
+        if quartered.is_some() {
+            for_each_quarter(&ids, |id| is_quartered(context, quartered, id), shade);
+            return;
+        }
+        for_each_triangle(&ids, |own, s, offset, count| shade(own, s, offset, count, ids.map(|id| id == own)));
     }
 
     /// The colour of triangle `id` at a point, 1/256 px from the picture's centre, in a pixel whose first
@@ -122,6 +144,42 @@ impl<'a> Shader<'a> {
             (true, _, Some(hull)) => hull.color(id as usize),
             _ => [0.0; 4],
         }
+    }
+}
+
+#[inline(always)]
+fn is_quartered(context: &RasterContext<'_>, surface: Option<&SurfacePass<'_>>, id: u32) -> bool {
+    // The material is that of a surface's triangle, not of a hull's.
+    surface.is_some_and(|surface| {
+        (id as usize) < context.plan.triangles.len() && surface.material(id as usize).is_quartered()
+    })
+}
+
+/// As [`for_each_triangle`], with which samples they are; triangles that are shaded in each quarter of the pixel come once
+/// for each quarter in which they have samples.
+#[inline(always)]
+pub(super) fn for_each_quarter<const S: usize>(
+    ids: &[u32; S],
+    is_quartered: impl Fn(u32) -> bool,
+    mut each: impl FnMut(u32, usize, [i32; 2], i32, [bool; S]),
+) {
+    let offsets = sample_offsets(S as u32);
+    let quarter = |s: usize| offsets[s].map(|at| at >= 128);
+    for s in 0..S {
+        if ids[s] == NOTHING {
+            continue;
+        }
+        let is_divided = is_quartered(ids[s]);
+        let same: [bool; S] = std::array::from_fn(|t| ids[t] == ids[s] && (!is_divided || quarter(t) == quarter(s)));
+        if same[..s].contains(&true) {
+            continue;
+        }
+        let (mut offset, mut count) = ([0, 0], 0);
+        for t in (0..S).filter(|&t| same[t]) {
+            offset = [offset[0] + offsets[t][0], offset[1] + offsets[t][1]];
+            count += 1;
+        }
+        each(ids[s], s, offset, count, same);
     }
 }
 

@@ -3,7 +3,7 @@
 //!
 //! Each pixel sums up what its triangles add in the order of its samples, as [`Shader::pixel`] does.
 
-use super::shade::{Shader, for_each_triangle};
+use super::shade::{Shader, for_each_quarter, for_each_triangle};
 use super::waiting::{Point, Waiting};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
@@ -114,9 +114,10 @@ impl Finder<'_> {
             for l in 0..LANES {
                 is_new[l] = seen[s][l] != NOTHING;
             }
-            for before in &seen[..s] {
+            let is_divided = self.are_quartered(&seen[s]);
+            for (before, in_quarter) in seen[..s].iter().zip(quarter_of(s as u32, S as u32)) {
                 for l in 0..LANES {
-                    is_new[l] &= before[l] != seen[s][l];
+                    is_new[l] &= (before[l] != seen[s][l]) | (is_divided[l] & !in_quarter);
                 }
             }
             let mut new = 0;
@@ -124,24 +125,38 @@ impl Finder<'_> {
                 new |= u32::from(is_new[l]) << l;
             }
             if new != 0 {
-                self.push(&seen, (s, new), [x, y], (row, colors));
+                self.push(&seen, (s, new, is_divided), [x, y], (row, colors));
             }
         }
     }
 
-    /// Adds what the pixels whose bits are in `new` see with sample `s` for the first time.
+    /// True for triangles that are shaded in each quarter of a pixel.
+    #[inline(always)]
+    fn are_quartered(&self, ids: &[u32; LANES]) -> [bool; LANES] {
+        let mut are = [false; LANES];
+        if self.shader.has_quarters() {
+            for l in 0..LANES {
+                are[l] = self.shader.is_quartered(ids[l]);
+            }
+        }
+        are
+    }
+
+    /// Adds what the pixels whose bits are in `new` see with sample `s` for the first time: in its quarter of the pixel
+    /// alone where `is_divided`.
     #[inline(always)]
     fn push<const S: usize>(
         &mut self,
         seen: &[[u32; LANES]; S],
-        (s, mut new): (usize, u32),
+        (s, mut new, is_divided): (usize, u32, [bool; LANES]),
         pixel: [u32; 2],
         (row, colors): (usize, &mut [[f32; 4]]),
     ) {
         let (mut count, mut offset) = ([0; LANES], [[0; LANES]; 2]);
-        for (own, at) in seen.iter().zip(sample_offsets(S as u32)).skip(s) {
+        let samples = seen.iter().zip(sample_offsets(S as u32)).zip(quarter_of(s as u32, S as u32));
+        for ((own, at), in_quarter) in samples.skip(s) {
             for l in 0..LANES {
-                let is_own = i32::from(own[l] == seen[s][l]);
+                let is_own = i32::from((own[l] == seen[s][l]) & (!is_divided[l] | in_quarter));
                 count[l] += is_own;
                 offset[0][l] += is_own * at[0];
                 offset[1][l] += is_own * at[1];
@@ -199,6 +214,20 @@ impl Finder<'_> {
             return;
         }
         let first = self.band.index(x as i32, y as i32, 0);
+        if self.shader.has_quarters() {
+            for_each_quarter(
+                ids,
+                |id| self.shader.is_quartered(id),
+                |id, s, offset, count, _| {
+                    let depths = &self.band.depth[first..first + S];
+                    let open = self.shader.open_share([x, y], depths[s], depths[0]);
+                    let at = self.shader.mean_place([x, y], offset, count);
+                    let weight = count as f32 / S as f32;
+                    self.waiting.push(Point { id, at, weight, pixel: pixel as u32, open }, colors);
+                },
+            );
+            return;
+        }
         for_each_triangle(ids, |id, s, offset, count| {
             let offset = if count == S as i32 { [128 * count; 2] } else { offset };
             let depths = &self.band.depth[first..first + S];
@@ -208,6 +237,15 @@ impl Finder<'_> {
             self.waiting.push(Point { id, at, weight, pixel: pixel as u32, open }, colors);
         });
     }
+}
+
+/// Per sample of so many, true if it lies in the same quarter of a pixel as sample `s`.
+#[inline(always)]
+fn quarter_of(s: u32, samples: u32) -> impl Iterator<Item = bool> {
+    let offsets = sample_offsets(samples);
+    let quarter = |at: &[i32; 2]| [at[0] >= 128, at[1] >= 128];
+    let own = quarter(&offsets[s as usize]);
+    offsets.iter().map(move |at| quarter(at) == own)
 }
 
 impl RasterContext<'_> {

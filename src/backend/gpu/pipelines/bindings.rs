@@ -193,7 +193,8 @@ const MIXED_COLOR: &[Binding] = &[
     (Slot::Points, ReadWrite),
 ];
 
-const MIXED_PARTS: &[Binding] = &[(Slot::Mixed, ReadWrite), (Slot::Lists, ReadWrite)];
+const MIXED_PARTS: &[Binding] =
+    &[(Slot::Attributes, Read), (Slot::Materials, Read), (Slot::Mixed, ReadWrite), (Slot::Lists, ReadWrite)];
 
 const MIXED_SHADE: &[Binding] = &[
     (Slot::Positions, Read),

@@ -46,6 +46,7 @@ const MIXED_LISTS: &str = include_str!("../../../../shaders/mixed/lists.wgsl");
 const SHARES: &str = include_str!("../../../../shaders/mixed/shares.wgsl");
 const POINT_SETS: &str = include_str!("../../../../shaders/mixed/point_sets.wgsl");
 const SHARE_COLOR: &str = include_str!("../../../../shaders/mixed/share_color.wgsl");
+const MATERIAL: &str = include_str!("../../../../shaders/surface/material.wgsl");
 const HULL: &str = include_str!("../../../../shaders/surface/hull.wgsl");
 const GROUP: &str = include_str!("../../../../shaders/surface/group.wgsl");
 
@@ -59,6 +60,7 @@ const SHADE: &[&str] = &[
     include_str!("../../../../shaders/surface/normal.wgsl"),
     include_str!("../../../../shaders/surface/debug.wgsl"),
     include_str!("../../../../shaders/surface/point.wgsl"),
+    MATERIAL,
 ];
 
 impl Kernel {
@@ -234,7 +236,7 @@ impl Kernel {
             }
             Self::MixedParts => {
                 let kernel = include_str!("../../../../shaders/mixed/mixed_parts.wgsl");
-                return [MIXED_PLACE, MIXED_LATTICE, SHARES, POINT_SETS, kernel].concat();
+                return [MATERIAL, MIXED_PLACE, MIXED_LATTICE, SHARES, POINT_SETS, kernel].concat();
             }
             Self::MixedSum => return [MIXED_PLACE, include_str!("../../../../shaders/mixed/mixed_sum.wgsl")].concat(),
             _ => {
@@ -273,15 +275,15 @@ impl Kernel {
             Self::Thin => SHADED | key::PASS_MASKS,
             Self::MixedPixels => key::PEELING | key::SAMPLES,
             Self::MixedColor => SHADED | key::OCCLUSION | key::LINES,
-            Self::MixedParts => key::LINES | key::CLIPPED,
+            Self::MixedParts => key::LINES | key::CLIPPED | key::TRIANGLE_MATERIALS,
             Self::MixedShade => SHADED | key::OCCLUSION,
             Self::MixedSum => 0,
             Self::VisibilityFew { .. } => key::SAMPLES | key::PASS_MASKS | key::GANG,
             Self::Paint => SHADED | key::GANG,
             Self::VisibilityTile { target: SampleTarget::Layer, .. } => key::SAMPLES | key::BEHIND_SURFACE,
-            Self::Composite => SHADED | key::PEELED_HULL | key::LINES,
+            Self::Composite => SHADED | key::PEELED_HULL | key::LINES | key::ADAPTIVE,
             Self::Grid | Self::Gather => key::SAMPLES | key::GANG,
-            Self::Shade => SHADED | key::PEELING | key::OCCLUSION | key::GANG,
+            Self::Shade => SHADED | key::PEELING | key::OCCLUSION | key::GANG | key::ADAPTIVE,
             Self::LineLight => SHADED,
             Self::Coverage => key::HOLED | key::SURFACE | key::HULL | key::PEELING | key::SAMPLES | key::ADAPTIVE,
             Self::Holes => key::SAMPLES,

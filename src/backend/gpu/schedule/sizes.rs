@@ -47,7 +47,7 @@ const ITEMS_PER_PIXEL: u32 = 4;
 const LIST_ITEMS_MIN: u32 = 1 << 18;
 const LIST_ITEMS_MAX: u32 = 1 << 20;
 
-/// Parts of the colours of mixed pixels, at most.
+/// Parts of the colours of mixed pixels, at most; four times as many where each quarter of a pixel has its own.
 const PARTS_MAX: u32 = 1 << 18;
 
 /// Bytes of such an item, and of a part.
@@ -184,7 +184,8 @@ impl Banding {
 
     /// Parts of their colours that there is room for.
     pub fn part_capacity(&self, plan: &DrawPlan<'_>) -> u32 {
-        self.list_capacity(plan).min(PARTS_MAX)
+        let quarters = if plan.has_quarters() { 4 } else { 1 };
+        quarters * self.list_capacity(plan).min(PARTS_MAX)
     }
 
     /// Bytes of the lists and parts.

@@ -2,6 +2,7 @@
 //! oracle's points, in encoded colours.
 
 pub mod hairs;
+pub mod mirrors;
 
 use meshsnap::backend::Renderer;
 use meshsnap::limits::Deadline;

@@ -2,6 +2,7 @@
 //! they are drawn leaves no trace.
 
 mod layers;
+mod quarters;
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::{CpuRenderer, Isa};

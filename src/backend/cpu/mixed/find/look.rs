@@ -8,7 +8,7 @@ use crate::backend::cpu::geometry::samples::NOTHING;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility::area;
 use crate::backend::cpu::vector::turned_to_viewer;
-use crate::plan::{ShadedMaterial, SurfacePass, TEXTURE_NONE, flags, slots};
+use crate::plan::{ShadedMaterial, SurfacePass, TEXTURE_NONE, flags};
 
 /// Flags of materials whose colour does not go on smoothly where faces share a corner.
 const BROKEN: u32 = flags::DERIVATIVE_NORMALS | flags::DEBUG | flags::WIRES | flags::BY_ANGLE;
@@ -25,9 +25,6 @@ pub const NORMAL_SHIFT: f32 = 1.5;
 
 /// Factor of the normals of metals that mirror sharply: those that differ by about a degree look alike.
 pub const MIRROR_SCALE: f32 = 256.0;
-
-/// Metals with less roughness mirror sharply.
-pub const MIRROR_ROUGHNESS: f32 = 0.5;
 
 /// The highest bits of a key: what its other bits say.
 pub mod kinds {
@@ -169,9 +166,7 @@ pub fn step_of_linked(context: &RasterContext<'_>, a: u32, b: u32) -> Step {
 /// The values of a normal.
 #[inline(always)]
 fn normal_values(material: &ShadedMaterial, normal: [f32; 3], front: bool) -> [f32; 3] {
-    let may_be_smooth =
-        material.roughness < MIRROR_ROUGHNESS || material.textures[slots::METALLIC_ROUGHNESS].texture != TEXTURE_NONE;
-    let scale = if material.metallic > 0.0 && may_be_smooth { MIRROR_SCALE } else { 1.0 };
+    let scale = if material.mirrors_sharply() { MIRROR_SCALE } else { 1.0 };
     let mut values = turned_to_viewer(normal, front);
     for k in 0..3 {
         values[k] = scale * (values[k] + NORMAL_SHIFT);

@@ -30,6 +30,12 @@ impl<const N: usize> Uv<N> {
         let [right, down] = b.derivatives();
         Self { at: blend(corners, &b.value), d: [blend(corners, &right), blend(corners, &down)] }
     }
+
+    /// The same for points that stand for a part of a pixel, with this share of its width.
+    #[inline(always)]
+    pub fn narrowed(self, share: f32) -> Self {
+        Self { d: self.d.map(|step| step.map(|lanes| lanes.map(|v| share * v))), ..self }
+    }
 }
 
 /// Values at the corners of triangles: `[corner][component][lane]`.

@@ -1,0 +1,77 @@
+//! Metals that mirror sharply are shaded in each quarter of a pixel, the same on both back-ends and however they are drawn.
+
+use meshsnap::backend::Renderer;
+use meshsnap::backend::cpu::{CpuRenderer, Isa};
+use meshsnap::backend::gpu::GpuRenderer;
+
+use super::{draw, last_of_each};
+use crate::support::gpus::gpus;
+use crate::support::likeness::{Likeness, Tolerance};
+use crate::support::scenes;
+use crate::support::shapes;
+
+const METAL: [(&str, &str); 5] = [
+    ("style", "smooth"),
+    ("samples", "adaptive"),
+    ("surface.metallic", "1"),
+    ("surface.roughness", "0.1"),
+    ("light.preset", "studio"),
+];
+
+#[test]
+fn every_way_of_drawing_gives_the_same_picture() {
+    let meshes = [shapes::torus(24), shapes::torus(120), shapes::two_balls()].map(|obj| scenes::mesh(&obj));
+    let mut plain = CpuRenderer::plain(1);
+    let mut others: Vec<CpuRenderer> = Isa::available().into_iter().map(|isa| CpuRenderer::with_isa(2, isa)).collect();
+    others.extend([1, 3].map(CpuRenderer::new));
+    let mut gpus: Vec<GpuRenderer> = gpus().into_iter().flatten().map(|gpu| GpuRenderer::new(gpu.clone())).collect();
+    let looks: [&[(&str, &str)]; 7] = [
+        &[("size", "160x120")],
+        // Many faces in a pixel.
+        &[("size", "30")],
+        &[("size", "200"), ("light.ambient_occlusion", "0"), ("outline.thickness", "2")],
+        // Metal beside glass, and beside what is neither.
+        &[("size", "160x120"), ("materials.left.surface.opacity", "0.4")],
+        &[("size", "160x120"), ("materials.left.surface.metallic", "0")],
+        &[("size", "160x120"), ("wire.thickness", "1"), ("wire.edges", "triangles"), ("wire.lit", "true")],
+        // Faces that reach behind the eye.
+        &[("size", "160x120"), ("camera.eye", "0.6,0.1,0.9"), ("camera.target", "0,0,0"), ("camera.fov_deg", "90")],
+    ];
+    let mut compared = 0;
+    for look in looks {
+        for (i, mesh) in meshes.iter().enumerate() {
+            let plan = scenes::plan(mesh, &scenes::spec(&last_of_each(&[&METAL[..], look].concat())));
+            assert!(plan.is_adaptive && plan.has_quarters(), "{look:?}");
+            let want = draw(&mut plain, &plan);
+            for renderer in &mut others {
+                assert!(draw(renderer, &plan) == want, "{look:?} of mesh {i}");
+                compared += 1;
+            }
+            for renderer in &mut gpus {
+                let found = draw(renderer, &plan);
+                assert_eq!(renderer.draw_times().mixed_pixels, plain.draw_times().mixed_pixels, "{look:?} of mesh {i}");
+                Likeness::of(&found, &want).assert(Tolerance::TWINS, &format!("{look:?} of mesh {i}"));
+            }
+        }
+    }
+    assert!(compared >= 3 * 7 * 3, "{compared}");
+}
+
+#[test]
+fn what_does_not_mirror_sharply_is_shaded_once() {
+    let mesh = scenes::mesh(&shapes::torus(24));
+    let mut cases = 0;
+    for (more, has_quarters) in [
+        (&[][..], true),
+        (&[("surface.roughness", "0.5")], false),
+        (&[("surface.metallic", "0")], false),
+        (&[("style", "flat")], false),
+        (&[("samples", "16")], false),
+        (&[("surface.metallic", "0.2"), ("surface.roughness", "0.45")], true),
+    ] {
+        let plan = scenes::plan(&mesh, &scenes::spec(&last_of_each(&[&METAL[..], more].concat())));
+        assert_eq!(plan.has_quarters(), has_quarters, "{more:?}");
+        cases += 1;
+    }
+    assert_eq!(cases, 6);
+}
