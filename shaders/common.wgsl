@@ -54,9 +54,8 @@ struct Frame {
     vertices_at: u32,
     items_at: u32,
     pixels_at: u32,
-    // How far from a pixel's samples the middle of a tinted line is that touches the pixel, at most, 1/256 px; 0 where
-    // layers tint no line.
-    tint_reach: f32,
+    // 1 if layers tint lines, else 0.
+    has_tints: u32,
     // 1 if triangles may be shaded in each quarter of a pixel, else 0.
     has_quarters: u32,
     padding_a: u32,
@@ -124,6 +123,8 @@ struct Batch {
     // Items of the lists of mixed pixels, and parts of their colours, that there is room for.
     list_capacity: u32,
     part_capacity: u32,
+    // The line pass's, see LinePass::tint_reach in src/plan/lines/mod.rs.
+    tint_reach: f32,
 };
 
 // Threads of a workgroup, in every kernel.

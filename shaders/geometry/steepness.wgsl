@@ -1,5 +1,9 @@
-// The slope of a triangle's depth on screen, given its corners times their W. Twin of
-// src/backend/cpu/geometry/steepness.rs.
+// Depths that are compared: what rounding does to them, and the slope of a triangle's depth on
+// screen, given its corners times their W. Twin of src/backend/cpu/geometry/steepness.rs.
+
+// Smallest ratio of the depth of what lies in front of a line to the line's: covers the rounding of
+// f32.
+const NEARER_RATIO: f32 = 1.0000019073486328;
 
 const MIN_POSITIVE: f32 = 1.17549435e-38;
 

@@ -8,7 +8,8 @@
 // Peeled layers per sample.
 @group(1) @binding(27) var<storage, read> peel_state: array<PeelState>;
 // Per pixel, the surface over nothing or, where a line is, the finished colour so far; over.wgsl
-// tells them apart. Then, per pixel, the light on the pass's lines, and what tints.wgsl says.
+// tells them apart. Then, per pixel, the light on the pass's lines, and the layers that tint them,
+// laid out as in tints.wgsl.
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
 // Per pixel, a face; then, per pixel, the depth of the pass's nearest line, where layers tint it.
 @group(1) @binding(11) var<storage, read_write> owners: array<u32>;
@@ -93,9 +94,10 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
 fn tinted(i: u32, depth: f32, color: vec4<f32>) -> vec4<f32> {
     let least = rn(depth * NEARER_RATIO);
     let depths = colors[tint_depths_at(i)];
+    let steepness = colors[tint_steepness_at(i)];
     var front = vec4(0.0);
     for (var layer = 0u; layer < TINTS; layer++) {
-        if depths[layer] > least {
+        if depths[layer] != 0.0 && depths[layer] - rn(steepness[layer] * batch.tint_reach) > least {
             front += colors[tint_at(i, layer)];
         }
     }

@@ -341,7 +341,6 @@ fn window_of(s: Segment, share: u32) -> Window {
 // for each thread, they are drawn: that takes far longer than finding them.
 fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32>, thread: u32) {
     let is_lit = (batch.line_flags & LIT_PASS) != 0u;
-    let goes_on = (batch.line_flags & (LIT_PASS | TINTED_PASS)) != 0u;
     let start = point_at(s, interval.x);
     let end = point_at(s, interval.y);
     let reach = reach_of_line() + SLACK_PX;
@@ -358,10 +357,15 @@ fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32
         let center = vec2<f32>(pixel) + 0.5;
         let at = u32((pixel.y - batch.row_first) * frame.width + pixel.x);
         let place = place_of(s.direction, start - center, end - center);
-        // A full pixel stays full. Only a line that is lit or tinted goes on, to find the face that lights it or the
-        // nearest of its depths.
+        var depth = 0.0;
+        if (batch.line_flags & TINTED_PASS) != 0u {
+            let nearest = interval.x + rn(place.past.x * s.inverse_length);
+            depth = depth_of(s, min(max(nearest, interval.x), interval.y));
+        }
+        // A full pixel stays full. But a lit line still looks for the face that lights it, and one
+        // that layers tint for the nearest depth.
         if p < pixels && touches(place) && owns(s, window, center)
-            && (!only_stroked() || is_stroked(at)) && (goes_on || !is_full(at)) {
+            && (!only_stroked() || is_stroked(at)) && (is_lit || !is_full(at) || is_nearest(at, depth)) {
             if is_rim_pass() {
                 atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], point_marks());
             }
@@ -369,8 +373,6 @@ fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32
             if is_lit {
                 face = lighting_face(edge);
             }
-            let nearest = interval.x + rn(place.past.x * s.inverse_length);
-            let depth = depth_of(s, min(max(nearest, interval.x), interval.y));
             waiting[atomicAdd(&waiting_count, 1u)] = Waiting(s.direction, start - center, end - center, at, face, depth);
         }
         draw_waiting(LINE_THREADS, thread);
@@ -400,10 +402,19 @@ fn draw_waiting(least: u32, thread: u32) {
         }
         if (batch.line_flags & TINTED_PASS) != 0u {
             // Numbers that are not negative are in the order of their bits.
-            let pixels = u32((batch.row_end - batch.row_first) * frame.width);
-            atomicMax(&owners[pixels + stroke.at], bitcast<u32>(stroke.depth));
+            atomicMax(&owners[depth_place(stroke.at)], bitcast<u32>(stroke.depth));
         }
     }
+}
+
+// The place of the depth of a pixel's nearest line.
+fn depth_place(pixel_at: u32) -> u32 {
+    return u32((batch.row_end - batch.row_first) * frame.width) + pixel_at;
+}
+
+// True if layers tint the pass, and no line in the pixel is as near so far.
+fn is_nearest(pixel_at: u32, depth: f32) -> bool {
+    return (batch.line_flags & TINTED_PASS) != 0u && bitcast<u32>(depth) > atomicLoad(&owners[depth_place(pixel_at)]);
 }
 
 // True if only the pixels that points do not tell about get strokes.

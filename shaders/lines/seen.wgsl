@@ -3,9 +3,6 @@
 
 const NOTHING: u32 = 0xFFFFFFFFu;
 
-// Smallest ratio of the depth of what lies in front of a line to the line's: covers the rounding of f32.
-const NEARER_RATIO: f32 = 1.0000019073486328;
-
 // Id and depth bits of a sample.
 fn seen_at(pixel: vec2<i32>, sample: u32) -> vec2<u32> {
     if !has_samples(pixel) {

@@ -70,7 +70,7 @@ fn write_parts(number: u32, thread: u32) {
     }
     for (var p = own.x; first != LIST_END && !has_sets && p < POINTS; p += own.y) {
         if is_first(p) {
-            write_part(first, p, at, share_of(p, is_few), bitcast<u32>(depth_of_share(p, own.y)));
+            write_part(first, p, at, share_of(p, is_few), bitcast<u32>(depth_of_share(p, select(1u, FEW_STEP, is_few))));
         }
     }
     if has(LINES) && thread < BORDER_WORDS {

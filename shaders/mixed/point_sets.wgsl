@@ -10,7 +10,8 @@ var<workgroup> digit_sets: array<u32, DIGIT_WORDS>;
 const SETS_WORDS: u32 = WORKGROUP * FIRSTS_WORDS;
 const DIGIT_WORDS: u32 = 8u * FIRSTS_WORDS;
 
-// In place of the number of a quarter: the whole pixel. Quarters are left and right, above and below.
+// Quarters of a pixel have numbers: 0 and 1 above, left and right; 2 and 3 below. This one means all of
+// the pixel.
 const WHOLE: u32 = 4u;
 
 // Finds the points whose rows have each digit: a word by each thread.

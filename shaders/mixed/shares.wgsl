@@ -28,7 +28,8 @@ fn find_firsts(thread: u32, is_few: bool) {
     workgroupBarrier();
 }
 
-// True if no point before p sees its triangle; none in the same quarter, where each is shaded.
+// True if no point before p sees its triangle. Where a triangle is shaded in each quarter of the
+// pixel: no point of the same quarter.
 fn is_first_of_all(p: u32, step: u32) -> bool {
     let is_divided = is_quartered(~seen[p].x);
     for (var q = p % step; q < p; q += step) {

@@ -6,7 +6,7 @@
 @group(1) @binding(27) var<storage, read_write> peel_state: array<PeelState>;
 // Per layer: 1 if there may be another behind it.
 @group(1) @binding(28) var<storage, read_write> peel_rounds: array<atomic<u32>>;
-// As tints.wgsl says.
+// The colours that layers add to pixels, laid out as in tints.wgsl.
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
 
 @compute @workgroup_size(WORKGROUP)
@@ -82,7 +82,7 @@ fn take_layer(sample: u32) -> u32 {
 // Composites the colour of a group under the other layers of its samples, in pixel i with this first sample.
 fn add_group(i: u32, first: u32, group: Group, color: vec4<f32>) {
     let depth = bitcast<f32>(peel_state[first + firstTrailingBit(group.same)].previous.y);
-    // How many samples of it remain under the colours so far.
+    // The number of its samples, less what the layers in front hide of them.
     var seen = 0.0;
     for (var s = 0; s < sample_count(); s++) {
         if ((group.same >> u32(s)) & 1u) != 0u {
@@ -94,24 +94,27 @@ fn add_group(i: u32, first: u32, group: Group, color: vec4<f32>) {
     }
 }
 
-// Adds a triangle of this layer to pixel i: what it adds to the pixel's colour, and its depth at one of its samples.
+// Adds a triangle of this layer to pixel i: the colour that it adds to the pixel's, and its depth at
+// one of its samples.
 fn add_tint(i: u32, id: u32, depth: f32, color: vec4<f32>) {
     if color.w <= ALPHA_MIN {
         return;
     }
-    var farthest = MIN_POSITIVE;
-    let steep = steepness_of(id);
-    if steep >= 0.0 {
-        farthest = max(depth - rn(steep * frame.tint_reach), MIN_POSITIVE);
+    var farthest = depth;
+    var steepest = steepness_of(id);
+    if steepest < 0.0 {
+        steepest = EDGE_ON;
     }
     var sum = color;
     let layer = min(batch.layer, TINTS - 1u);
     let before = colors[tint_depths_at(i)][layer];
     if before != 0.0 {
         farthest = min(before, farthest);
+        steepest = max(colors[tint_steepness_at(i)][layer], steepest);
         sum = colors[tint_at(i, layer)] + color;
     }
     colors[tint_depths_at(i)][layer] = farthest;
+    colors[tint_steepness_at(i)][layer] = steepest;
     colors[tint_at(i, layer)] = sum;
 }
 
@@ -137,7 +140,7 @@ fn steepness_of(id: u32) -> f32 {
     return steepness(p, q, r);
 }
 
-// Composites a colour under a sample's other layers. Returns the share of it that remains under them.
+// Composites a colour under a sample's other layers. Returns the share of the colour that shows.
 fn accumulate(sample: u32, color: vec4<f32>) -> f32 {
     let so_far = peel_state[sample].color;
     let rest = 1.0 - so_far.w;

@@ -1,21 +1,31 @@
-// Stage shade, per pixel: where composite.wgsl keeps what layers add to a pixel, and coverage.wgsl finds it. Twin of
-// src/backend/cpu/peeling/tints.rs. Both declare `colors`, which holds, for all pixels of the band each: colours, the light
-// on lines, what each layer adds, and the layers' depths.
+// Stage shade, per pixel: the places where composite.wgsl keeps what layers add to a pixel, and
+// coverage.wgsl finds it. Twin of src/backend/cpu/peeling/tints.rs. Both declare `colors`, which
+// holds, for all pixels of the band each: colours, the light on lines, the colour that each layer
+// adds, the layers' depths, and their steepness.
 
-// Layers that are told apart. All from the last of these on count as one, as far away as the farthest of them.
+// Layers that are told apart. All from the last of these on count as one, as far away as the
+// farthest of them.
 const TINTS: u32 = 4u;
+
+// The steepness of a triangle that is seen from the edge: it is in front of nothing.
+const EDGE_ON: f32 = 1e30;
 
 // True if layers tint some lines.
 fn keeps_tints() -> bool {
-    return has(LINES) && frame.tint_reach > 0.0;
+    return has(LINES) && frame.has_tints != 0u;
 }
 
-// The place of what a layer adds to pixel i, premultiplied linear RGBA.
+// The place of the colour that a layer adds to pixel i, premultiplied linear RGBA.
 fn tint_at(i: u32, layer: u32) -> u32 {
     return (2u + layer) * batch.count + i;
 }
 
-// The place of the layers' depths: the farthest that each may be within a line's reach, 0 where there is none.
+// The place of the layers' depths, the farthest of each; 0 where there is none.
 fn tint_depths_at(i: u32) -> u32 {
     return (2u + TINTS) * batch.count + i;
+}
+
+// The place of the greatest of their changes of depth per 1/256 px.
+fn tint_steepness_at(i: u32) -> u32 {
+    return (3u + TINTS) * batch.count + i;
 }

@@ -20,6 +20,7 @@ use super::cpu::mixed::find::thin;
 use super::cpu::mixed::thinness;
 use super::cpu::mixed::{points, triangle};
 use super::cpu::occlusion;
+use super::cpu::peeling::tints;
 use super::cpu::surface::{light, texture};
 use super::gpu::params::{Batch, FACES_BACK, FACES_BOTH, FACES_FRONT, Frame, OWN_TRIANGLES, line_flags};
 use super::gpu::pipelines::{Access, Kernel, SampleTarget, SampleWrite, Slot, key};
@@ -91,6 +92,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
         "SLACK_PX" = segment::SLACK_PX
     );
     add!("STROKES_SIDE_BY_SIDE" = coverage::STROKES_SIDE_BY_SIDE, "ALPHA_MIN" = ALPHA_MIN, "TINTS" = TINTS);
+    add!("EDGE_ON" = tints::EDGE_ON);
     add!("NEARER_RATIO" = steepness::NEARER_RATIO, "SNAP_ERROR" = hidden_lines::SNAP_ERROR);
     add!("INTERVAL_MIN_PX" = hidden_lines::INTERVAL_MIN_PX, "GAP_MIN_PX" = hidden_lines::GAP_MIN_PX);
     add!("IDS_MAX" = line_shares::IDS_MAX, "INTERVALS_MAX" = line_shares::INTERVALS_MAX);
@@ -284,7 +286,7 @@ fn layouts() -> Vec<(&'static str, Layout)> {
                 near_w ambient lamp_count zero width height triangle_count vertex_count masks_at material_count layer_fade
                 hull_color_count image_count normal_triangles_at uv_triangles_at color_triangles_at
                 occlusion_depth occlusion_spread taps occlusion_reach second_uvs_at vertices_at items_at pixels_at
-                tint_reach has_quarters padding_a
+                has_tints has_quarters padding_a
             }),
         ),
         (
@@ -293,7 +295,7 @@ fn layouts() -> Vec<(&'static str, Layout)> {
                 first count faces row_first row_end capacity large_first large_end huge_first huge_end edges_per_group
                 line_width line_smoothing line_flags line_exponent line_windows line_slices line_peak line_units
                 line_pass seen_first seen_end samples_at pass_bit layer column_first column_end seen_margin
-                alone_size groups_each cleared rgba_at slots_first slots_end list_capacity part_capacity
+                alone_size groups_each cleared rgba_at slots_first slots_end list_capacity part_capacity tint_reach
             }),
         ),
         (

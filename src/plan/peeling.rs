@@ -18,6 +18,9 @@ pub const ALPHA_MIN: f32 = 1e-4;
 /// farthest of them.
 pub const TINTS: usize = 4;
 
+// A GPU keeps their depths in one vector.
+const _: () = assert!(TINTS <= 4);
+
 /// The share of their colour that fading hidden lines keep.
 pub const FADE: f32 = 0.25;
 

@@ -49,7 +49,7 @@ pub struct Frame {
     pub vertices_at: u32,
     pub items_at: u32,
     pub pixels_at: u32,
-    pub tint_reach: f32,
+    pub has_tints: u32,
     pub has_quarters: u32,
     pub padding_a: u32,
 }
@@ -119,11 +119,12 @@ pub struct Batch {
     pub slots_end: u32,
     pub list_capacity: u32,
     pub part_capacity: u32,
+    pub tint_reach: f32,
 }
 
 /// Bits of [`Batch::line_flags`].
 pub mod line_flags {
-    use crate::plan::{LinePass, Shown, Side};
+    use crate::plan::{DrawPlan, LinePass, Shown, Side};
 
     /// Only what nothing hides is drawn.
     pub const SHOWN_VISIBLE: u32 = 1;
@@ -147,7 +148,7 @@ pub mod line_flags {
     pub const TINTED_PASS: u32 = 512;
 
     /// The bits of a pass; [`FIRST_PASS`], [`HOLES`] and [`RIM_PASS`] aside.
-    pub fn of(lines: &LinePass, something_hides: bool, lights_lines: bool, tints_lines: bool) -> u32 {
+    pub fn of(plan: &DrawPlan<'_>, lines: &LinePass, something_hides: bool) -> u32 {
         let when = |condition: bool, flag: u32| if condition { flag } else { 0 };
         // Without a surface nothing hides a line, and there is no visibility buffer to read.
         let shown = match lines.shown {
@@ -159,9 +160,9 @@ pub mod line_flags {
         shown
             | when(lines.unseen_side.is_some(), SKIP_BACK)
             | when(lines.contour, CONTOUR)
-            | when(lines.lit && lights_lines, LIT_PASS)
+            | when(lines.lit && plan.lights_lines(), LIT_PASS)
             | when(lines.unseen_side == Some(Side::Front), INSIDE_OUT)
-            | when(lines.is_tinted && tints_lines, TINTED_PASS)
+            | when(plan.tints(lines), TINTED_PASS)
     }
 }
 
@@ -198,7 +199,7 @@ impl Frame {
             frame.hull_color = hull.color(0);
             frame.hull_color_count = hull.colors.len() as u32;
         }
-        frame.tint_reach = plan.tint_reach();
+        frame.has_tints = u32::from(plan.tints_lines());
         frame.has_quarters = u32::from(plan.has_quarters());
         frame.layer_fade = plan.peeling().map_or(1.0, |layers| layers.fade);
         frame

@@ -55,6 +55,13 @@ impl LinePass {
         0.5 * self.width_px + 0.5 * self.smoothing_px + std::f32::consts::FRAC_1_SQRT_2
     }
 
+    /// A layer tints a line that it is nearer than even when moved this far down its slope, 1/256 px: three times the
+    /// largest distance between a sample of a pixel that the line touches and its middle. A round surface drops to its
+    /// contour by twice the slope that is seen close to it, and by up to three times that within half its radius.
+    pub fn tint_reach(&self) -> f32 {
+        3.0 * 256.0 * (self.reach_px() + 1.0)
+    }
+
     /// Coverage in the middle of a line by its ramp alone, 0 to 1.
     pub fn peak(&self) -> f32 {
         if self.smoothing_px > self.width_px { self.width_px / self.smoothing_px } else { 1.0 }
@@ -136,14 +143,12 @@ impl DrawPlan<'_> {
 
     /// True if layers tint any line.
     pub fn tints_lines(&self) -> bool {
-        self.tint_reach() > 0.0
+        self.lines.iter().any(|lines| self.tints(lines))
     }
 
-    /// How far from a pixel's samples the middle of a tinted line is that touches the pixel, at most, 1/256 px. 0 if
-    /// layers tint no line.
-    pub fn tint_reach(&self) -> f32 {
-        let tinted = self.lines.iter().filter(|lines| lines.is_tinted && self.peeling().is_some());
-        tinted.map(|lines| 256.0 * (lines.reach_px() + 1.0)).fold(0.0, f32::max)
+    /// True if layers tint the lines of a pass.
+    pub fn tints(&self, lines: &LinePass) -> bool {
+        lines.is_tinted && self.peeling().is_some()
     }
 
     /// True if any line is lit and there is a visible surface to take the light from.

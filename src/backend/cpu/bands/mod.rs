@@ -168,9 +168,8 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
         scratch.strokes.reset(pixels);
         scratch.owners.clear();
         scratch.owners.resize(lit_pixels, 0);
-        let is_tinted = pass.is_tinted && plan.peeling().is_some();
         scratch.line_depths.clear();
-        scratch.line_depths.resize(if is_tinted { pixels } else { 0 }, 0.0);
+        scratch.line_depths.resize(if plan.tints(pass) { pixels } else { 0 }, 0.0);
         find_holes(context, pass, (&bins.triangles, band), &scratch.samples, &mut scratch.holes);
         let target = &mut LineTarget {
             strokes: &mut scratch.strokes,

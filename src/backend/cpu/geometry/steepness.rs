@@ -1,4 +1,5 @@
-//! Depths that are compared: what rounding does to them, and the slope of a triangle's depth on screen. Twin of `shaders/geometry/steepness.wgsl`.
+//! Depths that are compared: what rounding does to them, and the slope of a triangle's depth on screen.
+//! Twin of `shaders/geometry/steepness.wgsl`.
 
 use super::transform::{ScreenVertex, homogeneous, recip};
 use crate::backend::cpu::RasterContext;

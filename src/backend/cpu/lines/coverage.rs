@@ -264,7 +264,7 @@ fn composite_kernel(
     (light, depths): (&[Light], &[f32]),
     colors: &mut [[f32; 4]],
 ) {
-    let peak = lines.peak();
+    let (peak, reach) = (lines.peak(), lines.tint_reach());
     for (i, c) in colors.iter_mut().enumerate() {
         let (cover, mask) = match (holes.covered_share(i), strokes.of(i)) {
             (Some(cover), _) => (cover, &NO_POINTS),
@@ -280,7 +280,7 @@ fn composite_kernel(
             };
             let mut color = light.get(i).map_or(lines.color, |light| light.on_premultiplied(lines.color));
             if let (Some(&depth), Some(peel)) = (depths.get(i), compositor.peel) {
-                color = peel.tints.tinted(i, depth, color);
+                color = peel.tints.tinted(i, (depth, reach), color);
             }
             *c = std::array::from_fn(|k| cover * color[k] + under[k] * (1.0 - cover * color[3]));
             c[3] = -c[3];

@@ -30,6 +30,13 @@ pub struct LineTarget<'a> {
 }
 
 impl LineTarget<'_> {
+    /// True if one more stroke at this depth changes nothing in a pixel. A full pixel stays full; but a lit line still
+    /// looks for the face that lights it, and one that layers tint for the nearest depth.
+    #[inline(always)]
+    fn is_done(&self, at: usize, owner: u32, depth: impl Fn() -> f32) -> bool {
+        owner == 0 && self.strokes.is_full(at) && self.depths.get(at).is_none_or(|nearest| depth() <= *nearest)
+    }
+
     /// Notes what lights a pixel's line, if something does, and how deep the line is.
     #[inline(always)]
     pub fn note(&mut self, at: usize, owner: u32, depth: f32) {
@@ -177,9 +184,6 @@ impl<'a> LineDrawer<'a> {
     #[inline(always)]
     fn draw_piece(&mut self, window: &Window<'_>, piece: &Piece, owner: u32, target: &mut LineTarget<'_>) {
         let [a, b] = piece.ends;
-        // A full pixel stays full. Only a line that is lit or tinted goes on, to find the face that lights it or the
-        // nearest of its depths.
-        let goes_on = owner > 0 || !target.depths.is_empty();
         let width_px = self.band.size_px[0];
         let area = Footprint::new(window, [a, b], self.pen.reach);
         let [first, last] = area.rows(self.rows);
@@ -196,7 +200,8 @@ impl<'a> LineDrawer<'a> {
                     let l = touched.trailing_zeros() as usize % LANES;
                     touched &= touched - 1;
                     let (at, center) = (row + x as usize + l, [centers[0] + l as f32, centers[1]]);
-                    if (!goes_on && target.strokes.is_full(at))
+                    let place = places.of(l);
+                    if target.is_done(at, owner, || piece.depth(window.segment, &place))
                         || !window.owns(center)
                         || !self.may_draw(at, target.holes)
                     {
@@ -204,7 +209,6 @@ impl<'a> LineDrawer<'a> {
                     }
                     let ends = [[a[0] - center[0], a[1] - center[1]], [b[0] - center[0], b[1] - center[1]]];
                     let mut mask = Mask::default();
-                    let place = places.of(l);
                     if let Some(amount) = stroke::cover(&self.pen, &self.direction, ends, &place, &mut mask) {
                         target.strokes.add(at, amount, &mask, self.pen.peak);
                         target.note(at, owner, piece.depth(window.segment, &place));

@@ -1,12 +1,15 @@
 //! Stage shade, per pixel: what layers add to it, by their depths. Lines behind them take their tint. Twin of
 //! `shaders/peeling/tints.wgsl`.
 //!
-//! A line counts as behind a layer only where this is sure: the layer must be nearer than the line even at its farthest
-//! within the line's reach. Otherwise a line would be behind the faces that it runs along.
+//! A layer counts as in front of a line only if it is nearer even when moved down its slope as far as
+//! [`tint_reach`](crate::plan::LinePass::tint_reach) says. Otherwise a line would be behind the faces that it runs along.
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::steepness::{NEARER_RATIO, steepness_of};
 use crate::plan::{ALPHA_MIN, DrawPlan, TINTS};
+
+/// The steepness of a triangle that is seen from the edge: it is in front of nothing.
+pub const EDGE_ON: f32 = 1e30;
 
 /// The layers of a band's pixels: means over each pixel's samples.
 #[derive(Default)]
@@ -14,58 +17,66 @@ pub struct Tints {
     rounds: [Round; TINTS],
     /// The rounds so far that are told apart.
     count: usize,
+    /// False where layers tint no line.
+    is_kept: bool,
     /// The triangle that was added last, and its steepness.
-    last: Option<(u32, Option<f32>)>,
-    /// How far from a pixel a line is that covers a part of it, at most, 1/256 px. 0 where no line asks.
-    reach: f32,
+    last: Option<(u32, f32)>,
 }
 
-/// One of a pixel's layers, for each pixel of the band.
+/// One layer of each pixel of the band.
 #[derive(Default)]
 struct Round {
-    /// The farthest that it may be within a line's reach; 0 where there is none.
-    depth: Vec<f32>,
-    /// What it adds to the pixel's colour, premultiplied linear RGBA.
+    seen: Vec<Seen>,
+    /// The colour that it adds to each pixel, premultiplied linear RGBA.
     colors: Vec<[f32; 4]>,
+}
+
+/// The place of a pixel's layer.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    /// The farthest of its depths; 0 where there is none.
+    depth: f32,
+    /// The greatest of its changes of depth per 1/256 px.
+    steepness: f32,
 }
 
 impl Tints {
     /// Bytes per pixel.
-    pub const PIXEL_BYTES: usize = TINTS * (size_of::<f32>() + size_of::<[f32; 4]>());
+    pub const PIXEL_BYTES: usize = TINTS * (size_of::<Seen>() + size_of::<[f32; 4]>());
 
     /// Allocated bytes.
     pub fn bytes(&self) -> usize {
         let of =
-            |round: &Round| round.depth.capacity() * size_of::<f32>() + round.colors.capacity() * size_of::<[f32; 4]>();
+            |round: &Round| round.seen.capacity() * size_of::<Seen>() + round.colors.capacity() * size_of::<[f32; 4]>();
         self.rounds.iter().map(of).sum()
     }
 
-    /// Forgets all layers, and takes on a plan.
+    /// Forgets all layers, before those of another band.
     pub fn begin(&mut self, plan: &DrawPlan<'_>) {
-        (self.count, self.last, self.reach) = (0, None, plan.tint_reach());
+        (self.count, self.last, self.is_kept) = (0, None, plan.tints_lines());
     }
 
-    /// Takes on the next layer of so many pixels, if a line asks.
+    /// Makes room for the next layer of so many pixels.
     pub fn begin_round(&mut self, pixels: usize) {
-        if !self.are_kept() {
+        if !self.is_kept {
             return;
         }
         if let Some(round) = self.rounds.get_mut(self.count) {
-            round.depth.clear();
-            round.depth.resize(pixels, 0.0);
+            round.seen.clear();
+            round.seen.resize(pixels, Seen::default());
             // Written before they are read.
             round.colors.resize(pixels, [0.0; 4]);
             self.count += 1;
         }
     }
 
-    /// True if a line asks.
+    /// False where layers tint no line.
     #[inline(always)]
     pub fn are_kept(&self) -> bool {
-        self.reach > 0.0
+        self.is_kept
     }
 
-    /// Adds a triangle of the current layer to a pixel: what it adds to the pixel's colour, and its depth at one of its
+    /// Adds a triangle of the current layer to a pixel: the colour that it adds to the pixel's, and its depth at one of its
     /// samples.
     #[inline(always)]
     pub fn add(&mut self, context: &RasterContext<'_>, pixel: usize, (id, depth): (u32, f32), color: [f32; 4]) {
@@ -76,31 +87,30 @@ impl Tints {
         // Most neighbours show one triangle.
         let steepness = match self.last {
             Some((last, steepness)) if last == id => steepness,
-            _ => steepness_of(context, id),
+            _ => steepness_of(context, id).unwrap_or(EDGE_ON),
         };
         self.last = Some((id, steepness));
-        let farthest = match steepness {
-            Some(steepness) => (depth - steepness * self.reach).max(f32::MIN_POSITIVE),
-            None => f32::MIN_POSITIVE,
-        };
-        if round.depth[pixel] == 0.0 {
-            (round.depth[pixel], round.colors[pixel]) = (farthest, color);
+        let seen = &mut round.seen[pixel];
+        if seen.depth == 0.0 {
+            (*seen, round.colors[pixel]) = (Seen { depth, steepness }, color);
         } else {
-            round.depth[pixel] = round.depth[pixel].min(farthest);
+            *seen = Seen { depth: seen.depth.min(depth), steepness: seen.steepness.max(steepness) };
             for k in 0..4 {
                 round.colors[pixel][k] += color[k];
             }
         }
     }
 
-    /// The colour (premultiplied) of a line in a pixel at this depth, with what lies in front of it. Its alpha is what
-    /// it hides: the layers in front of it are in the picture already.
+    /// The colour (premultiplied) of a line in a pixel at this depth, with what lies in front of it; `reach` is its
+    /// [`tint_reach`](crate::plan::LinePass::tint_reach). Its alpha is what it hides: the layers in front of it are in the
+    /// picture already.
     #[inline(always)]
-    pub fn tinted(&self, pixel: usize, depth: f32, color: [f32; 4]) -> [f32; 4] {
+    pub fn tinted(&self, pixel: usize, (depth, reach): (f32, f32), color: [f32; 4]) -> [f32; 4] {
         let least = depth * NEARER_RATIO;
         let mut front = [0.0; 4];
         for round in &self.rounds[..self.count] {
-            if round.depth[pixel] > least {
+            let seen = round.seen[pixel];
+            if seen.depth - seen.steepness * reach > least {
                 for k in 0..4 {
                     front[k] += round.colors[pixel][k];
                 }

@@ -210,7 +210,20 @@ impl Kernel {
             }
             Self::Coverage => {
                 let kernel = include_str!("../../../../shaders/lines/coverage.wgsl");
-                [OVER, STROKE_WORDS, SEEN, INSET, LATTICE, FREE_POINTS, PEEL_STATE, TINTS, MIXED_PLACE, kernel].concat()
+                [
+                    OVER,
+                    STROKE_WORDS,
+                    SEEN,
+                    INSET,
+                    LATTICE,
+                    FREE_POINTS,
+                    PEEL_STATE,
+                    TINTS,
+                    STEEPNESS,
+                    MIXED_PLACE,
+                    kernel,
+                ]
+                .concat()
             }
             Self::Resolve => [OVER, ENCODE, include_str!("../../../../shaders/resolve.wgsl")].concat(),
         }

@@ -155,8 +155,8 @@ impl Schedule {
                 line_peak: lines.peak(),
                 line_width: lines.width_px,
                 line_smoothing: lines.smoothing_px,
-                line_flags: line_flags::of(lines, has_visibility(plan), plan.lights_lines(), plan.tints_lines())
-                    | first,
+                tint_reach: lines.tint_reach(),
+                line_flags: line_flags::of(plan, lines, has_visibility(plan)) | first,
                 line_pass: pass,
                 ..pixels
             };

@@ -240,7 +240,7 @@ pub fn samples(plan: &DrawPlan<'_>, rows: u32) -> u64 {
 /// them (shaders/peeling/tints.wgsl).
 pub fn color_bytes(plan: &DrawPlan<'_>) -> u64 {
     let vectors = match () {
-        _ if plan.tints_lines() => 2 + TINTS + TINTS.div_ceil(4),
+        _ if plan.tints_lines() => 2 + TINTS + 2,
         _ if plan.lights_lines() => 2,
         _ => 1,
     };

@@ -21,7 +21,7 @@ fn draw(renderer: &mut dyn Renderer, plan: &DrawPlan<'_>) -> Image {
 }
 
 /// Each key once, with its last value.
-fn last_of_each<'a>(keys: &[(&'a str, &'a str)]) -> Vec<(&'a str, &'a str)> {
+pub fn last_of_each<'a>(keys: &[(&'a str, &'a str)]) -> Vec<(&'a str, &'a str)> {
     let is_last = |i: usize| keys[i + 1..].iter().all(|other| other.0 != keys[i].0);
     (0..keys.len()).filter(|&i| is_last(i)).map(|i| keys[i]).collect()
 }

@@ -1,10 +1,14 @@
 //! Metals that mirror sharply are shaded in each quarter of a pixel, the same on both back-ends and however they are drawn.
 
+use image::ImageFormat;
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::{CpuRenderer, Isa};
 use meshsnap::backend::gpu::GpuRenderer;
+use meshsnap::mesh::Mesh;
+use serde_json::json;
 
 use super::{draw, last_of_each};
+use crate::render::textures::levels::{encode, model};
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
 use crate::support::scenes;
@@ -18,9 +22,26 @@ const METAL: [(&str, &str); 5] = [
     ("light.preset", "studio"),
 ];
 
+/// A tent whose texture bends normals, and says how rough and how much of a metal it is.
+fn textured() -> Mesh {
+    let random = |x: u32, y: u32| (x * 7919 + y * 104_729) % 251;
+    let texel = |x, y| image::Rgb([100 + (random(x, y) / 5) as u8, (random(y, x) / 2) as u8, 255]);
+    let picture = encode(&image::RgbImage::from_fn(64, 64, texel).into(), ImageFormat::Png);
+    let tent =
+        [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 1.0, 0.4]], [[1.0, 0.0, 0.0], [1.4, 0.9, -0.3], [0.5, 1.0, 0.4]]];
+    let uvs = [[[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]], [[2.0, 0.0], [3.0, 2.0], [0.0, 2.0]]];
+    let texture = json!({ "index": 0 });
+    let material = json!({
+        "pbrMetallicRoughness": { "metallicRoughnessTexture": texture }, "normalTexture": texture, "doubleSided": true
+    });
+    model(&tent, &uvs, &picture, material)
+}
+
 #[test]
 fn every_way_of_drawing_gives_the_same_picture() {
-    let meshes = [shapes::torus(24), shapes::torus(120), shapes::two_balls()].map(|obj| scenes::mesh(&obj));
+    let [coarse, fine, balls] =
+        [shapes::torus(24), shapes::torus(120), shapes::two_balls()].map(|obj| scenes::mesh(&obj));
+    let meshes = [coarse, fine, balls, textured()];
     let mut plain = CpuRenderer::plain(1);
     let mut others: Vec<CpuRenderer> = Isa::available().into_iter().map(|isa| CpuRenderer::with_isa(2, isa)).collect();
     others.extend([1, 3].map(CpuRenderer::new));
@@ -28,14 +49,20 @@ fn every_way_of_drawing_gives_the_same_picture() {
     let looks: [&[(&str, &str)]; 7] = [
         &[("size", "160x120")],
         // Many faces in a pixel.
-        &[("size", "30")],
-        &[("size", "200"), ("light.ambient_occlusion", "0"), ("outline.thickness", "2")],
+        &[("size", "30"), ("light.ambient_occlusion", "1")],
+        &[("size", "200"), ("outline.thickness", "2")],
         // Metal beside glass, and beside what is neither.
         &[("size", "160x120"), ("materials.left.surface.opacity", "0.4")],
         &[("size", "160x120"), ("materials.left.surface.metallic", "0")],
         &[("size", "160x120"), ("wire.thickness", "1"), ("wire.edges", "triangles"), ("wire.lit", "true")],
         // Faces that reach behind the eye.
-        &[("size", "160x120"), ("camera.eye", "0.6,0.1,0.9"), ("camera.target", "0,0,0"), ("camera.fov_deg", "90")],
+        &[
+            ("size", "160x120"),
+            ("camera.eye", "0.6,0.1,0.9"),
+            ("camera.target", "0,0,0"),
+            ("camera.fov_deg", "90"),
+            ("light.ambient_occlusion", "1"),
+        ],
     ];
     let mut compared = 0;
     for look in looks {
@@ -54,7 +81,7 @@ fn every_way_of_drawing_gives_the_same_picture() {
             }
         }
     }
-    assert!(compared >= 3 * 7 * 3, "{compared}");
+    assert!(compared >= 4 * 7 * 3, "{compared}");
 }
 
 #[test]

@@ -137,6 +137,11 @@ fn fine_levels_are_kept_where_they_may_be_seen() {
         assert_eq!(image(&[("size", size)], &[]), (first, first > 0), "{size}");
         assert_eq!(image(&[("size", size)], &[SkipKind::FineTextureLevels]), (0, false));
     }
+    // A quarter of a pixel is half as wide: of metals that mirror sharply, levels are one finer.
+    for (metallic, samples, first) in [("1", "adaptive", 1), ("0", "adaptive", 2), ("1", "16", 2)] {
+        let keys = [("size", "64"), ("surface.metallic", metallic), ("surface.roughness", "0.1"), ("samples", samples)];
+        assert_eq!(image(&keys, &[]).0, first, "{metallic} {samples}");
+    }
     // From within its plane, next to it, behind it.
     for eye in ["0.3,0.3,0", "0.3,0.3,0.0001", "0.3,-0.1,0.01"] {
         assert_eq!(image(&[("size", "64"), ("camera.eye", eye), ("camera.target", "0.3,0.4,0")], &[]).0, 0, "{eye}");
