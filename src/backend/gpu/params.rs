@@ -120,6 +120,9 @@ pub struct Batch {
     pub list_capacity: u32,
     pub part_capacity: u32,
     pub tint_reach: f32,
+    pub padding_a: u32,
+    pub padding_b: u32,
+    pub padding_c: u32,
 }
 
 /// Bits of [`Batch::line_flags`].
@@ -165,6 +168,9 @@ pub mod line_flags {
             | when(plan.tints(lines), TINTED_PASS)
     }
 }
+
+// A gang has an array of them in its uniforms.
+const _: () = assert!(size_of::<Batch>().is_multiple_of(16));
 
 /// Distance between [`Batch`]es in their buffer: every device can bind at multiples of this.
 pub const BATCH_STRIDE: usize = 256;
