@@ -138,8 +138,8 @@ impl PeelBand {
         Some(id)
     }
 
-    /// Composites a colour under the colours so far of some samples of the pixel at `first`. Returns how many samples of
-    /// it remain under the colours so far.
+    /// Composites a colour under the colours so far of some samples of the pixel at `first`. Returns the number of these
+    /// samples, less what the colours so far hide of them.
     #[inline(always)]
     pub fn accumulate<const S: usize>(&mut self, first: usize, same: [bool; S], color: [f32; 4]) -> f32 {
         let mut seen = 0.0;
