@@ -125,10 +125,11 @@ struct Batch {
     part_capacity: u32,
     // The line pass's, see LinePass::tint_reach in src/plan/lines/mod.rs.
     tint_reach: f32,
+    // The picture's, see LinePass::unseen_gap_px there.
+    unseen_gap: f32,
     // A gang has an array of these, whose stride must be a multiple of 16.
     padding_a: u32,
     padding_b: u32,
-    padding_c: u32,
 };
 
 // Threads of a workgroup, in every kernel.

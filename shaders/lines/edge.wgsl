@@ -257,14 +257,14 @@ fn draw_share(first: u32, share: u32, drawn_to: vec2<f32>, thread: u32) -> vec2<
             } else {
                 let end = min(run.y, range.y);
                 let is_gap = begin > range.x && end < range.y;
-                let least = rn(s.inverse_length * select(INTERVAL_MIN_PX, GAP_MIN_PX, is_gap));
-                if !shows_visible {
-                    interval = vec2(hidden_from, begin);
-                } else if end - begin > least {
+                let is_shown = shows_interval(edge, s, vec2(begin, end), is_gap);
+                if shows_visible && is_shown {
                     interval = vec2(begin, end);
+                } else if !shows_visible && (is_shown || !is_gap) {
+                    interval = vec2(hidden_from, begin);
+                    hidden_from = BEYOND;
                 }
                 begin = end;
-                hidden_from = BEYOND;
             }
         }
         if interval.x < interval.y {

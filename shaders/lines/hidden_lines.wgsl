@@ -12,8 +12,8 @@ const SNAP_ERROR: f32 = 1.25;
 // show as dots.
 const INTERVAL_MIN_PX: f32 = 0.0625;
 
-// Shortest visible interval between two hidden ones, pixels: a sliver of surface there may have no
-// sample.
+// Shortest visible interval between two hidden ones, pixels. A face without a sample may hide longer
+// ones: see `shows_interval`.
 const GAP_MIN_PX: f32 = 0.25;
 
 // More than any place on an edge.
@@ -192,6 +192,33 @@ fn joined_run(found: vec2<f32>, begin: f32, thread: u32) -> vec2<f32> {
         run_now = vec2(atomicExchange(&run_bits[0], 0u), atomicExchange(&run_bits[1], bitcast<u32>(BEYOND)));
     }
     return bitcast<vec2<f32>>(workgroupUniformLoad(&run_now));
+}
+
+// True if a visible interval is long enough to be drawn. One between two hidden ones counts as hidden if it is so
+// short that a face there may have no sample, and all samples around it show what is nearer.
+fn shows_interval(edge: vec4<u32>, s: Segment, interval: vec2<f32>, is_gap: bool) -> bool {
+    let length = interval.y - interval.x;
+    if !(length > rn(s.inverse_length * select(INTERVAL_MIN_PX, GAP_MIN_PX, is_gap))) {
+        return false;
+    }
+    return !is_gap || length > rn(s.inverse_length * batch.unseen_gap) || !is_behind_samples(edge, s, interval);
+}
+
+// True if all samples of the pixel in the middle of an interval show faces nearer than it, none of them the
+// edge's own.
+fn is_behind_samples(edge: vec4<u32>, s: Segment, interval: vec2<f32>) -> bool {
+    let pixel = vec2<i32>(floor(point_at(s, rn((interval.x + interval.y) * 0.5))));
+    if !has_samples(pixel) {
+        return false;
+    }
+    let nearest = rn(max(depth_of(s, interval.x), depth_of(s, interval.y)) * NEARER_RATIO);
+    for (var i = 0u; i < u32(sample_count()); i++) {
+        let seen = seen_at(pixel, i);
+        if seen.x == edge.z || seen.x == edge.w || !(bitcast<f32>(seen.y) > nearest) {
+            return false;
+        }
+    }
+    return true;
 }
 
 // A run from `begin` with one more hidden interval.

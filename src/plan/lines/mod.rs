@@ -67,20 +67,30 @@ impl LinePass {
         if self.smoothing_px > self.width_px { self.width_px / self.smoothing_px } else { 1.0 }
     }
 
-    /// Widths of lines whose coverage holes in faces may tell, pixels, for a number of samples per
-    /// pixel.
-    ///
-    /// Around each point of a visible inset lies a disc of the face, as wide as the line. It contains
-    /// a sample if its radius is at least that of the largest circle without one, which is
-    /// .708, .396, .263 and .193 px for 1, 4, 8 and 16 samples. Wide lines leave few holes.
-    pub fn holes_width_px(samples: u32) -> std::ops::RangeInclusive<f32> {
-        let least = match samples {
+    /// Width of a face, pixels, from which on a sample always sees it, for a number of samples per pixel: the
+    /// diameter of the largest circle without a sample (1.415, .791, .525 and .386 px), rounded up.
+    pub fn unseen_width_px(samples: u32) -> f32 {
+        match samples {
             1 => 1.5,
             4 => 0.8,
             8 => 0.55,
             _ => 0.4,
-        };
-        least..=8.0
+        }
+    }
+
+    /// Widths of lines whose coverage holes in faces may tell, pixels, for a number of samples per
+    /// pixel.
+    ///
+    /// Around each point of a visible inset lies a disc of the face, as wide as the line. So a sample
+    /// sees it. Wide lines leave few holes.
+    pub fn holes_width_px(samples: u32) -> std::ops::RangeInclusive<f32> {
+        Self::unseen_width_px(samples)..=8.0
+    }
+
+    /// Length of a visible part between two hidden ones, pixels, up to which a face without a sample may hide it. At
+    /// most 1 px: an edge is looked at only that far beyond what its line reaches.
+    pub fn unseen_gap_px(samples: u32) -> f32 {
+        Self::unseen_width_px(samples).min(1.0)
     }
 
     /// Pixels up to this far from one in which a face is hidden in part are marked: the visible part

@@ -15,7 +15,7 @@ use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::steepness::{Corner, NEARER_RATIO, corner, is_far, steepness};
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, recip};
 use crate::backend::cpu::geometry::visibility::area;
-use crate::plan::Edge;
+use crate::plan::{Edge, LinePass};
 
 /// Largest position error on screen, 1/256 px: half a unit each for the snapping of a triangle and
 /// of an edge, and some for f32. A surface hides an edge only if it is nearer even when moved this
@@ -27,8 +27,8 @@ pub const SNAP_ERROR: f32 = 1.25;
 /// show as dots.
 pub const INTERVAL_MIN_PX: f32 = 1.0 / 16.0;
 
-/// Shortest visible interval between two hidden ones, pixels: a sliver of surface there may have no
-/// sample.
+/// Shortest visible interval between two hidden ones, pixels. A face without a sample may hide longer
+/// ones: see [`Gaps`].
 pub const GAP_MIN_PX: f32 = 1.0 / 4.0;
 
 /// Intervals along an edge in which something hides it, kept from edge to edge.
@@ -151,33 +151,66 @@ impl HiddenIntervals {
     }
 
     /// Appends the visible intervals of the range to `intervals`, in order, without those below the
-    /// smallest lengths. `px` is a pixel's share of the edge.
+    /// smallest lengths.
     #[inline(always)]
-    pub fn visible(&self, range: [f32; 2], px: f32, intervals: &mut Vec<[f32; 2]>) {
+    pub fn visible(&self, gaps: &Gaps<'_>, range: [f32; 2], intervals: &mut Vec<[f32; 2]>) {
+        let least = gaps.segment.inverse_length * INTERVAL_MIN_PX;
         if self.hidden.is_empty() {
             intervals.push(range);
             return;
         }
         let mut from = range[0];
         for &[start, end] in &self.hidden {
-            if start - from > px * if from > range[0] { GAP_MIN_PX } else { INTERVAL_MIN_PX } {
+            if if from > range[0] { gaps.are_shown([from, start]) } else { start - from > least } {
                 intervals.push([from, start]);
             }
             from = from.max(end);
         }
-        if range[1] - from > px * INTERVAL_MIN_PX {
+        if range[1] - from > least {
             intervals.push([from, range[1]]);
         }
     }
 
-    /// Appends the hidden intervals, merged.
-    pub fn hidden(&self, intervals: &mut Vec<[f32; 2]>) {
+    /// Appends the hidden intervals, merged with those between them that are not visible.
+    #[inline(always)]
+    pub fn hidden(&self, gaps: &Gaps<'_>, intervals: &mut Vec<[f32; 2]>) {
         for &[start, end] in &self.hidden {
             match intervals.last_mut() {
-                Some(interval) if start <= interval[1] => interval[1] = interval[1].max(end),
+                Some(interval) if !gaps.are_shown([interval[1], start]) => interval[1] = interval[1].max(end),
                 _ => intervals.push([start, end]),
             }
         }
+    }
+}
+
+/// Intervals of an edge between two hidden ones.
+pub struct Gaps<'a> {
+    pub context: &'a RasterContext<'a>,
+    pub band: &'a SampleBand,
+    pub edge: &'a Edge,
+    pub segment: &'a Segment,
+}
+
+impl Gaps<'_> {
+    /// True if such an interval is visible. A very short one is not, and neither is one so short that a face
+    /// there may have no sample, if all samples around it show what is nearer.
+    #[inline(always)]
+    fn are_shown(&self, [start, end]: [f32; 2]) -> bool {
+        let (length, px) = (end - start, self.segment.inverse_length);
+        let unseen = px * LinePass::unseen_gap_px(self.context.plan.samples);
+        length > px * GAP_MIN_PX && (length > unseen || !self.are_behind_samples([start, end]))
+    }
+
+    /// True if all samples of the pixel in the middle of an interval show faces nearer than it, none of
+    /// them the edge's own.
+    fn are_behind_samples(&self, [start, end]: [f32; 2]) -> bool {
+        let [x, y] = self.segment.point((start + end) * 0.5).map(|v| v.floor() as i32);
+        if !self.band.has(x, y) {
+            return false;
+        }
+        let nearest = self.segment.depth(start).max(self.segment.depth(end)) * NEARER_RATIO;
+        let (ids, depths) = self.band.pixel(x, y);
+        ids.iter().zip(depths).all(|(id, depth)| !self.edge.faces.contains(id) & (*depth > nearest))
     }
 }
 

@@ -156,6 +156,7 @@ impl Schedule {
                 line_width: lines.width_px,
                 line_smoothing: lines.smoothing_px,
                 tint_reach: lines.tint_reach(),
+                unseen_gap: LinePass::unseen_gap_px(plan.samples),
                 line_flags: line_flags::of(plan, lines, has_visibility(plan)) | first,
                 line_pass: pass,
                 ..pixels

@@ -2,6 +2,7 @@
 
 pub mod borders;
 pub mod formulas;
+pub mod gaps;
 pub mod holes;
 pub mod limits;
 pub mod looks;
