@@ -290,10 +290,22 @@ fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
     // continued far.
     let depths = vec3(p.z, q.z, r.z);
     let ws = vec3(p.w, q.w, r.w);
-    let first = nearer_by(s, at_start, at_end, depths, ws, slack, interval.x);
-    let last = nearer_by(s, at_start, at_end, depths, ws, slack, interval.y);
-    if first <= 0.0 && last <= 0.0 {
-        return none;
+    var first = nearer_by(s, weights_at(at_start, at_end, interval.x), depths, ws, NEARER_RATIO, slack, interval.x);
+    var last = nearer_by(s, weights_at(at_start, at_end, interval.y), depths, ws, NEARER_RATIO, slack, interval.y);
+    if min(first, last) <= 0.0 {
+        let ratio = 2.0 - NEARER_RATIO;
+        let perhaps_first = nearer_by(s, weights_at(at_start, at_end, interval.x), depths, ws, ratio, -slack, interval.x);
+        let perhaps_last = nearer_by(s, weights_at(at_start, at_end, interval.y), depths, ws, ratio, -slack, interval.y);
+        if max(perhaps_first, perhaps_last) <= 0.0 {
+            return none;
+        }
+        let middle = weights_at(at_start, at_end, rn(0.5 * (interval.x + interval.y)));
+        if has_beneath(edge, id, p, q, r, is_clockwise, slack, middle) {
+            first = perhaps_first;
+            last = perhaps_last;
+        } else if first <= 0.0 && last <= 0.0 {
+            return none;
+        }
     }
     let share = narrowed(vec2(0.0, 1.0), first, last);
     if share.x >= share.y {
@@ -307,7 +319,7 @@ fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
 fn may_be_hidden_by(s: Segment, a: Vertex, b: Vertex, c: Vertex) -> bool {
     let low = vec2<f32>(vec2(min(min(a.x, b.x), c.x), min(min(a.y, b.y), c.y)));
     let high = vec2<f32>(vec2(max(max(a.x, b.x), c.x), max(max(a.y, b.y), c.y)));
-    return max(max(a.z, b.z), c.z) > min(s.depths.x, s.depths.y)
+    return rn(max(max(a.z, b.z), c.z) * NEARER_RATIO) > min(s.depths.x, s.depths.y)
         && all(low <= max(s.ends.xy, s.ends.zw)) && all(high >= min(s.ends.xy, s.ends.zw));
 }
 
@@ -329,17 +341,21 @@ fn sides_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>, at: vec2<f32>, is_clockwis
     return select(-sides, sides, is_clockwise);
 }
 
+// Weights of the corners at t of the way along an edge whose ends have these: not negative.
+fn weights_at(at_start: vec3<f32>, at_end: vec3<f32>, t: f32) -> vec3<f32> {
+    return max(at_start + rn3(t * (at_end - at_start)), vec3(0.0));
+}
+
 // By how much the triangle is nearer than the edge at t of the way.
 fn nearer_by(
-    s: Segment, at_start: vec3<f32>, at_end: vec3<f32>, depths: vec3<f32>, ws: vec3<f32>, slack: f32, t: f32,
+    s: Segment, weights: vec3<f32>, depths: vec3<f32>, ws: vec3<f32>, ratio: f32, slack: f32, t: f32,
 ) -> f32 {
-    let weights = max(at_start + rn3(t * (at_end - at_start)), vec3(0.0));
     let z = rn3(weights * depths);
     let w = rn3(weights * ws);
     let depth = rn(rn(z.x + z.y) + z.z);
     let scale = rn(rn(w.x + w.y) + w.z);
     if scale > MIN_POSITIVE {
-        return (rn(depth * recip(scale)) - rn(depth_of(s, t) * NEARER_RATIO)) - slack;
+        return (rn(depth * recip(scale)) - rn(depth_of(s, t) * ratio)) - slack;
     }
     return -1.0;
 }

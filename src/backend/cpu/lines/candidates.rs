@@ -7,6 +7,7 @@
 use super::segment::Segment;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::NOTHING;
+use crate::backend::cpu::geometry::steepness::NEARER_RATIO;
 use crate::backend::cpu::geometry::transform::OUTSIDE;
 use crate::backend::cpu::isa::LANES;
 use crate::plan::Edge;
@@ -124,7 +125,7 @@ impl Corners {
                 & (right as f32 >= low[0])
                 & (top as f32 <= high[1])
                 & (bottom as f32 >= low[1]);
-            may[l] = u32::from(overlaps & (nearest > farthest));
+            may[l] = u32::from(overlaps & (nearest * NEARER_RATIO > farthest));
         }
         for l in 0..LANES {
             let from_first = |v: &[[i32; LANES]; 3], k: usize| v[k][l].wrapping_sub(v[0][l]);

@@ -6,9 +6,10 @@
 //! along the edge.
 
 use super::candidates::Candidates;
-use super::contour::volume;
+use super::contour::{sides, volume};
 use super::farthest::Farthest;
 use super::segment::Segment;
+use super::sheets::Sheet;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::is_moderate;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
@@ -244,6 +245,36 @@ pub(super) fn hidden_by(context: &RasterContext<'_>, edge: &Edge, segment: &Segm
     }
     let [start, end] = segment.ends();
     let sides = [sides(&corners, start, is_clockwise), sides(&corners, end, is_clockwise)];
+    let range = inside(&sides)?;
+    let slack = slack(&corners)?;
+    // Depths are compared only where the edge is inside, so that thin triangles need not be
+    // continued far.
+    let nearer = |t: f32, ratio: f32, slack: f32| {
+        let [a, b, c] = weights(&sides, t);
+        let z = (a * corners[0][2] + b * corners[1][2]) + c * corners[2][2];
+        let w = (a * corners[0][3] + b * corners[1][3]) + c * corners[2][3];
+        if w > f32::MIN_POSITIVE { (z * recip(w) - segment.depth(t) * ratio) - slack } else { -1.0 }
+    };
+    let mut nearer_by = range.map(|t| nearer(t, NEARER_RATIO, slack));
+    if nearer_by[0].min(nearer_by[1]) <= 0.0 {
+        let perhaps_by = range.map(|t| nearer(t, 2.0 - NEARER_RATIO, -slack));
+        if perhaps_by[0].max(perhaps_by[1]) <= 0.0 {
+            return None;
+        }
+        let sheet = Sheet { id, corners, is_clockwise, slack };
+        if sheet.has_beneath(context, edge, weights(&sides, 0.5 * (range[0] + range[1]))) {
+            nearer_by = perhaps_by;
+        }
+    }
+    let mut interval = [0.0, 1.0];
+    narrow(&mut interval, nearer_by)?;
+    let length = range[1] - range[0];
+    Some([range[0] + interval[0] * length, range[0] + interval[1] * length])
+}
+
+/// The part of an edge that is inside of a triangle on screen, given what its ends span with its sides.
+#[inline(always)]
+fn inside(sides: &[[f32; 3]; 2]) -> Option<[f32; 2]> {
     // An edge along a side counts as inside. Otherwise two triangles that share the side would
     // leave it visible between them.
     let is_along = |k: usize| (sides[0][k] == 0.0) & (sides[1][k] == 0.0);
@@ -258,39 +289,19 @@ pub(super) fn hidden_by(context: &RasterContext<'_>, edge: &Edge, segment: &Segm
             narrow(&mut range, [sides[0][k], sides[1][k]])?;
         }
     }
-    let slack = slack(&corners)?;
-    // Depths are compared only where the edge is inside, so that thin triangles need not be
-    // continued far.
-    let nearer = |t: f32| {
-        let weight = |k: usize| (sides[0][k] + t * (sides[1][k] - sides[0][k])).max(0.0);
-        let [a, b, c] = [weight(0), weight(1), weight(2)];
-        let z = (a * corners[0][2] + b * corners[1][2]) + c * corners[2][2];
-        let w = (a * corners[0][3] + b * corners[1][3]) + c * corners[2][3];
-        if w > f32::MIN_POSITIVE { (z * recip(w) - segment.depth(t) * NEARER_RATIO) - slack } else { -1.0 }
-    };
-    let mut interval = [0.0, 1.0];
-    narrow(&mut interval, [nearer(range[0]), nearer(range[1])])?;
-    let length = range[1] - range[0];
-    Some([range[0] + interval[0] * length, range[0] + interval[1] * length])
+    Some(range)
+}
+
+/// Weights of the corners at `t` of the way along an edge whose ends have these: not negative.
+#[inline(always)]
+fn weights(sides: &[[f32; 3]; 2], t: f32) -> [f32; 3] {
+    std::array::from_fn(|k| (sides[0][k] + t * (sides[1][k] - sides[0][k])).max(0.0))
 }
 
 /// Depth error of a triangle's plane due to snapping; None without area.
 #[inline(always)]
 fn slack(corners: &[Corner; 3]) -> Option<f32> {
     if is_far(corners) { Some(0.0) } else { Some(steepness(corners)? * SNAP_ERROR) }
-}
-
-/// Per side of a triangle, twice the area that it spans with a point; positive inside. Valid for
-/// corners behind the eye too.
-#[inline(always)]
-fn sides(corners: &[Corner; 3], [x, y]: [f32; 2], is_clockwise: bool) -> [f32; 3] {
-    let from = |k: usize| [corners[k][0] - x * corners[k][3], corners[k][1] - y * corners[k][3]];
-    let (a, b, c) = (from(0), from(1), from(2));
-    let side = |a: [f32; 2], b: [f32; 2]| {
-        let side = a[0] * b[1] - a[1] * b[0];
-        if is_clockwise { side } else { -side }
-    };
-    [side(b, c), side(c, a), side(a, b)]
 }
 
 /// Cuts a range down to where the affine function with these values at 0 and 1 is positive.

@@ -20,4 +20,5 @@ pub(crate) mod line_light;
 pub(crate) mod plain;
 pub(crate) mod profile;
 pub(crate) mod segment;
+pub(crate) mod sheets;
 pub(crate) mod stroke;

@@ -3,6 +3,7 @@
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::clip_segment;
+use crate::backend::cpu::geometry::steepness::NEARER_RATIO;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, round_to_i32, rsqrt};
 use crate::backend::cpu::isa::LANES;
 use crate::plan::Edge;
@@ -91,7 +92,9 @@ impl Segment {
             let (low, high) = (a.min(b).min(c) as f32, a.max(b).max(c) as f32);
             (low <= start[k].max(end[k])) & (high >= start[k].min(end[k]))
         };
-        (a.z.max(b.z).max(c.z) > self.farthest()) & overlaps(0, a.x, b.x, c.x) & overlaps(1, a.y, b.y, c.y)
+        (a.z.max(b.z).max(c.z) * NEARER_RATIO > self.farthest())
+            & overlaps(0, a.x, b.x, c.x)
+            & overlaps(1, a.y, b.y, c.y)
     }
 
     /// Depth at `t` of the way.

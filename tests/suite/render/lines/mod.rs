@@ -8,5 +8,6 @@ pub mod limits;
 pub mod looks;
 pub mod points;
 pub mod primitives;
+pub mod sheets;
 pub mod shortcuts;
 pub mod tinted;

@@ -1,0 +1,87 @@
+//! Stage lines, per edge and triangle: what stands on a sheet that is seen from below. Twin of
+//! `shaders/lines/sheets.wgsl`.
+//!
+//! The foot of a wall that stands on a floor lies in the floor's plane. Seen from above it is visible, and hidden-line
+//! removal keeps it whatever the rounding of depths says. Seen from below, the floor hides the wall. So it
+//! hides the foot, too.
+
+use super::contour::sides;
+use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::geometry::steepness::{Corner, NEARER_RATIO};
+use crate::backend::cpu::geometry::transform::recip;
+use crate::plan::Edge;
+
+/// Least distance of an edge from the sides of a sheet's triangle, 1/256 px. Closer to them it may be an edge of the
+/// triangle itself, or of its neighbour, whose vertices are others.
+pub const SIDE_MARGIN: f32 = 4.0;
+
+/// An edge lies in a triangle's plane if the distances of its ends from that are at most this share of those from a
+/// corner: the rounding of coordinates.
+pub const IN_PLANE: f32 = 1.0 / 262_144.0;
+
+/// A triangle on screen.
+pub struct Sheet {
+    pub id: u32,
+    /// Times their W.
+    pub corners: [Corner; 3],
+    pub is_clockwise: bool,
+    /// Depth error of its plane due to snapping.
+    pub slack: f32,
+}
+
+impl Sheet {
+    /// True if an edge lies in the triangle's plane, and all of its faces on the side that the viewer does not see. The
+    /// middle of the part that is inside the triangle on screen has these weights.
+    ///
+    /// Of more than two faces at an edge, those that it names are asked.
+    pub fn has_beneath(&self, context: &RasterContext<'_>, edge: &Edge, middle: [f32; 3]) -> bool {
+        let is_on_screen = self.corners.iter().all(|corner| corner[3] == 1.0);
+        let is_missing_or_behind = |face: u32| face == Edge::NO_FACE || self.is_before(context, edge, face);
+        is_on_screen
+            && self.is_inside(middle)
+            && self.is_plane_of(context, edge)
+            && edge.faces.into_iter().all(is_missing_or_behind)
+    }
+
+    /// True if a point on screen is farther from all sides than rounding moves them.
+    fn is_inside(&self, weights: [f32; 3]) -> bool {
+        (0..3).all(|k| {
+            let (a, b) = (self.corners[(k + 1) % 3], self.corners[(k + 2) % 3]);
+            weights[k] > SIDE_MARGIN * ((a[0] - b[0]).abs() + (a[1] - b[1]).abs())
+        })
+    }
+
+    /// True if an edge lies in the triangle's plane, by the positions themselves: on screen, planes are known less
+    /// exactly. No hull's triangle has such an edge.
+    fn is_plane_of(&self, context: &RasterContext<'_>, edge: &Edge) -> bool {
+        let (triangles, positions) = (&context.plan.triangles, &context.plan.positions);
+        let Some(triangle) = triangles.get(self.id as usize) else { return false };
+        let [p, q, r] = triangle.map(|v| positions[v as usize]);
+        let from_p = |v: [f32; 3]| [v[0] - p[0], v[1] - p[1], v[2] - p[2]];
+        let (q, r) = (from_p(q), from_p(r));
+        let normal = [q[1] * r[2] - q[2] * r[1], q[2] * r[0] - q[0] * r[2], q[0] * r[1] - q[1] * r[0]];
+        let length = |v: [f32; 3]| (v[0].abs() + v[1].abs()) + v[2].abs();
+        let most = IN_PLANE * length(normal);
+        edge.vertices.iter().all(|&v| {
+            let v = from_p(positions[v as usize]);
+            ((normal[0] * v[0] + normal[1] * v[1]) + normal[2] * v[2]).abs() <= most * length(v)
+        })
+    }
+
+    /// True if the third corner of an edge's face surely lies behind the triangle's plane.
+    fn is_before(&self, context: &RasterContext<'_>, edge: &Edge, face: u32) -> bool {
+        let [a, b] = edge.vertices;
+        let Some(third) = context.triangle(face).into_iter().find(|&v| v != a && v != b) else { return false };
+        let third = context.vertices[third as usize];
+        if third.is_outside() {
+            return false;
+        }
+        let [p, q, r] = sides(&self.corners, [third.x as f32, third.y as f32], self.is_clockwise);
+        let share = recip((p + q) + r);
+        let [x, y, z] = [p, q, r].map(|weight| weight * share);
+        let depth = (x * self.corners[0][2] + y * self.corners[1][2]) + z * self.corners[2][2];
+        // The farther from the triangle, the more its corners' rounding moves the plane.
+        let reach = (x.abs() + y.abs()) + z.abs();
+        depth - third.z > reach * (2.0 * self.slack + third.z * (NEARER_RATIO - 1.0))
+    }
+}
