@@ -161,6 +161,8 @@ const HOLES: u32 = 128u;
 const RIM_PASS: u32 = 256u;
 // Layers tint the lines.
 const TINTED_PASS: u32 = 512u;
+// Edges name all of their faces.
+const NAMES_ALL_FACES: u32 = 1024u;
 
 const SURFACE: u32 = 1u;
 const HULL: u32 = 2u;

@@ -5,32 +5,36 @@
 // triangle itself, or of its neighbour, whose vertices are others.
 const SIDE_MARGIN: f32 = 4.0;
 
-// An edge lies in a triangle's plane if the distances of its ends from that are at most this share of those from a
-// corner: the rounding of coordinates.
-const IN_PLANE: f32 = 3.814697265625e-6;
+// Share of positions by which rounding may move them out of a triangle's plane: some units of f32's last place.
+const IN_PLANE: f32 = 4.76837158203125e-7;
 
-// True if an edge lies in the plane of a triangle that is wholly on screen, and all of its faces on the side that the
-// viewer does not see. The middle of the part that is inside the triangle on screen has these weights.
+// True if an edge lies in the triangle's plane, and all of its faces on the side that the viewer does not see. The middle
+// of the part that is inside the triangle on screen has these weights. False for lines and points without faces, and in a
+// plan with edges that have more than two faces.
 fn has_beneath(
     edge: vec4<u32>, id: u32, p: vec4<f32>, q: vec4<f32>, r: vec4<f32>, is_clockwise: bool, slack: f32, middle: vec3<f32>,
 ) -> bool {
-    if !all(vec3(p.w, q.w, r.w) == vec3(1.0)) || !is_inside_by_margin(p, q, r, middle) || !is_plane_of(edge, id) {
+    if (batch.line_flags & NAMES_ALL_FACES) == 0u || edge.z == NO_FACE {
+        return false;
+    }
+    if !is_inside_by_margin(p, q, r, middle) || !is_plane_of(edge, id) {
         return false;
     }
     for (var side = 0u; side < 2u; side++) {
         let face = edge[2u + side];
-        if face != NO_FACE && !is_before(edge, face, p, q, r, is_clockwise, slack) {
+        if face != NO_FACE && !hides_face(edge, face, p, q, r, is_clockwise, slack) {
             return false;
         }
     }
     return true;
 }
 
-// True if a point on screen is farther from all sides than rounding moves them.
+// True if a point on screen is farther from all sides than rounding moves them: all is times the W of two corners.
 fn is_inside_by_margin(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>, weights: vec3<f32>) -> bool {
     let x = vec3(p.x, q.x, r.x);
     let y = vec3(p.y, q.y, r.y);
-    let lengths = rn3(abs(x.yzx - x.zxy)) + rn3(abs(y.yzx - y.zxy));
+    let w = vec3(p.w, q.w, r.w);
+    let lengths = rn3(abs(rn3(x.yzx * w.zxy) - rn3(x.zxy * w.yzx))) + rn3(abs(rn3(y.yzx * w.zxy) - rn3(y.zxy * w.yzx)));
     return all(weights > rn3(SIDE_MARGIN * lengths));
 }
 
@@ -45,10 +49,14 @@ fn is_plane_of(edge: vec4<u32>, id: u32) -> bool {
     let q = position_of(v.y) - p;
     let r = position_of(v.z) - p;
     let normal = rn3(q.yzx * r.zxy) - rn3(q.zxy * r.yzx);
-    let most = rn(IN_PLANE * sum3(abs(normal)));
+    let area = sum3(abs(normal));
+    let longest = max(sum3(abs(q)), sum3(abs(r)));
     for (var end = 0u; end < 2u; end++) {
-        let to_end = position_of(edge[end]) - p;
-        if !(abs(sum3(rn3(normal * to_end))) <= rn(most * sum3(abs(to_end)))) {
+        let at_end = position_of(edge[end]);
+        let to_end = at_end - p;
+        // Rounding of positions, times the area, and how the farther away the more it tilts the plane.
+        let rounding = rn(IN_PLANE * rn(sum3(abs(p)) + sum3(abs(at_end))));
+        if !(abs(sum3(rn3(normal * to_end))) <= rn(rounding * rn(area + rn(sum3(abs(to_end)) * longest)))) {
             return false;
         }
     }
@@ -60,7 +68,7 @@ fn position_of(v: u32) -> vec3<f32> {
 }
 
 // True if the third corner of an edge's face surely lies behind the triangle's plane.
-fn is_before(
+fn hides_face(
     edge: vec4<u32>, face: u32, p: vec4<f32>, q: vec4<f32>, r: vec4<f32>, is_clockwise: bool, slack: f32,
 ) -> bool {
     let v = corners_of_id(face);
@@ -73,9 +81,14 @@ fn is_before(
         return false;
     }
     let sides = sides_of(p, q, r, vec2(f32(third.x), f32(third.y)), is_clockwise);
-    let weights = rn3(sides * recip(sum3(sides)));
-    let depth = sum3(rn3(weights * vec3(p.z, q.z, r.z)));
+    let ws = rn3(sides * vec3(p.w, q.w, r.w));
+    let w = sum3(ws);
+    if w <= MIN_POSITIVE {
+        return false;
+    }
+    let share = recip(w);
+    let depth = rn(sum3(rn3(sides * vec3(p.z, q.z, r.z))) * share);
     // The farther from the triangle, the more its corners' rounding moves the plane.
-    let reach = sum3(abs(weights));
+    let reach = rn(sum3(abs(ws)) * share);
     return depth - third.z > rn(reach * (rn(2.0 * slack) + rn(third.z * (NEARER_RATIO - 1.0))));
 }

@@ -53,7 +53,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
         WIRES_ONLY PEELED_HULL DERIVATIVE_NORMALS VERTEX_COLORS UVS TEXTURES WIRE_MINIMUM WIRE_LIT DEBUG VARYING ADAPTIVE);
     // Line flags, pass masks, faces.
     add_same!("", line_flags: SHOWN_VISIBLE SHOWN_HIDDEN SKIP_BACK CONTOUR LIT_PASS FIRST_PASS INSIDE_OUT HOLES
-        RIM_PASS TINTED_PASS);
+        RIM_PASS TINTED_PASS NAMES_ALL_FACES);
     add!(
         "PASS_LAYER" = pass_mask::LAYER,
         "PASS_FRONT_ONLY" = pass_mask::FRONT_ONLY,

@@ -102,6 +102,7 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
         background_step,
         skips: cx.skips.done,
         short_chains: cx.short_chains,
+        names_all_faces: !cx.has_crowded_edges,
         legends,
         warnings: cx.warnings,
         mesh: cx.prepared.map(Prepared::token),

@@ -32,6 +32,8 @@ pub struct PlanContext<'c> {
     pub warnings: Vec<Warning>,
     /// Chains of outlines that are left out because they are short.
     pub short_chains: u32,
+    /// True if an edge that may be drawn has more than two faces.
+    pub has_crowded_edges: bool,
     /// Facts about the mesh from earlier plans, if they are kept.
     pub prepared: Option<&'c Prepared>,
     edges: Option<Arc<EdgeList>>,
@@ -49,6 +51,7 @@ impl<'c> PlanContext<'c> {
             skips: Skips::new(keep),
             warnings: Vec::new(),
             short_chains: 0,
+            has_crowded_edges: false,
             prepared: None,
             edges: None,
             silhouettes: None,

@@ -95,6 +95,8 @@ pub struct DrawPlan<'a> {
     pub hull: Option<HullPass<'a>>,
     /// Lines of exact width, drawn over everything else, in this order.
     pub lines: Vec<LinePass>,
+    /// True if the edges of lines name all of their faces, because none has more than two.
+    pub names_all_faces: bool,
     /// Premultiplied linear RGBA behind everything, at the picture's upper edge.
     pub background: [f32; 4],
     /// Change of the background from row to row; 0 where it has one colour.
@@ -146,6 +148,7 @@ impl<'a> DrawPlan<'a> {
             peeling: None,
             hull: None,
             lines: Vec::new(),
+            names_all_faces: true,
             background: [0.0; 4],
             background_step: [0.0; 4],
             skips: Vec::new(),

@@ -149,6 +149,8 @@ pub mod line_flags {
     pub const RIM_PASS: u32 = 256;
     /// Layers tint the lines.
     pub const TINTED_PASS: u32 = 512;
+    /// Edges name all of their faces.
+    pub const NAMES_ALL_FACES: u32 = 1024;
 
     /// The bits of a pass; [`FIRST_PASS`], [`HOLES`] and [`RIM_PASS`] aside.
     pub fn of(plan: &DrawPlan<'_>, lines: &LinePass, something_hides: bool) -> u32 {
@@ -166,6 +168,7 @@ pub mod line_flags {
             | when(lines.lit && plan.lights_lines(), LIT_PASS)
             | when(lines.unseen_side == Some(Side::Front), INSIDE_OUT)
             | when(plan.tints(lines), TINTED_PASS)
+            | when(plan.names_all_faces, NAMES_ALL_FACES)
     }
 }
 

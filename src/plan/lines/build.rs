@@ -29,6 +29,7 @@ pub fn passes(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<Lin
         true => cx.edges_and_orientation(mesh)?,
         false => (cx.edges(mesh)?, None),
     };
+    cx.has_crowded_edges = !list.further_faces.is_empty();
     styles.iter_mut().try_for_each(|style| style.settle(scene, &list, cx.deadline))?;
     let unseen_side = orientation.and_then(|orientation| unseen_side(groups, orientation));
     let silhouettes = match styles.iter().any(|style| style.contour) {

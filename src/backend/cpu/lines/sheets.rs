@@ -15,9 +15,8 @@ use crate::plan::Edge;
 /// triangle itself, or of its neighbour, whose vertices are others.
 pub const SIDE_MARGIN: f32 = 4.0;
 
-/// An edge lies in a triangle's plane if the distances of its ends from that are at most this share of those from a
-/// corner: the rounding of coordinates.
-pub const IN_PLANE: f32 = 1.0 / 262_144.0;
+/// Share of positions by which rounding may move them out of a triangle's plane: some units of f32's last place.
+pub const IN_PLANE: f32 = 1.0 / 2_097_152.0;
 
 /// A triangle on screen.
 pub struct Sheet {
@@ -33,21 +32,23 @@ impl Sheet {
     /// True if an edge lies in the triangle's plane, and all of its faces on the side that the viewer does not see. The
     /// middle of the part that is inside the triangle on screen has these weights.
     ///
-    /// Of more than two faces at an edge, those that it names are asked.
+    /// False for lines and points without faces, which are painted on both sides, and in a plan with edges that have
+    /// more than two faces: those do not name all of them.
     pub fn has_beneath(&self, context: &RasterContext<'_>, edge: &Edge, middle: [f32; 3]) -> bool {
-        let is_on_screen = self.corners.iter().all(|corner| corner[3] == 1.0);
-        let is_missing_or_behind = |face: u32| face == Edge::NO_FACE || self.is_before(context, edge, face);
-        is_on_screen
+        let [first, second] = edge.faces;
+        (context.plan.names_all_faces && first != Edge::NO_FACE)
             && self.is_inside(middle)
             && self.is_plane_of(context, edge)
-            && edge.faces.into_iter().all(is_missing_or_behind)
+            && self.hides_face(context, edge, first)
+            && (second == Edge::NO_FACE || self.hides_face(context, edge, second))
     }
 
-    /// True if a point on screen is farther from all sides than rounding moves them.
+    /// True if a point on screen is farther from all sides than rounding moves them: all is times the W of two corners.
     fn is_inside(&self, weights: [f32; 3]) -> bool {
         (0..3).all(|k| {
             let (a, b) = (self.corners[(k + 1) % 3], self.corners[(k + 2) % 3]);
-            weights[k] > SIDE_MARGIN * ((a[0] - b[0]).abs() + (a[1] - b[1]).abs())
+            let length = |i: usize| (a[i] * b[3] - b[i] * a[3]).abs();
+            weights[k] > SIDE_MARGIN * (length(0) + length(1))
         })
     }
 
@@ -61,15 +62,18 @@ impl Sheet {
         let (q, r) = (from_p(q), from_p(r));
         let normal = [q[1] * r[2] - q[2] * r[1], q[2] * r[0] - q[0] * r[2], q[0] * r[1] - q[1] * r[0]];
         let length = |v: [f32; 3]| (v[0].abs() + v[1].abs()) + v[2].abs();
-        let most = IN_PLANE * length(normal);
+        let (area, longest) = (length(normal), length(q).max(length(r)));
         edge.vertices.iter().all(|&v| {
-            let v = from_p(positions[v as usize]);
-            ((normal[0] * v[0] + normal[1] * v[1]) + normal[2] * v[2]).abs() <= most * length(v)
+            let v = positions[v as usize];
+            let to_v = from_p(v);
+            let distance = ((normal[0] * to_v[0] + normal[1] * to_v[1]) + normal[2] * to_v[2]).abs();
+            // Rounding of positions, times the area, and how the farther away the more it tilts the plane.
+            distance <= (IN_PLANE * (length(p) + length(v))) * (area + length(to_v) * longest)
         })
     }
 
     /// True if the third corner of an edge's face surely lies behind the triangle's plane.
-    fn is_before(&self, context: &RasterContext<'_>, edge: &Edge, face: u32) -> bool {
+    fn hides_face(&self, context: &RasterContext<'_>, edge: &Edge, face: u32) -> bool {
         let [a, b] = edge.vertices;
         let Some(third) = context.triangle(face).into_iter().find(|&v| v != a && v != b) else { return false };
         let third = context.vertices[third as usize];
@@ -77,11 +81,15 @@ impl Sheet {
             return false;
         }
         let [p, q, r] = sides(&self.corners, [third.x as f32, third.y as f32], self.is_clockwise);
-        let share = recip((p + q) + r);
-        let [x, y, z] = [p, q, r].map(|weight| weight * share);
-        let depth = (x * self.corners[0][2] + y * self.corners[1][2]) + z * self.corners[2][2];
+        let [a, b, c] = &self.corners;
+        let w = (p * a[3] + q * b[3]) + r * c[3];
+        if w <= f32::MIN_POSITIVE {
+            return false;
+        }
+        let share = recip(w);
+        let depth = ((p * a[2] + q * b[2]) + r * c[2]) * share;
         // The farther from the triangle, the more its corners' rounding moves the plane.
-        let reach = (x.abs() + y.abs()) + z.abs();
+        let reach = (((p * a[3]).abs() + (q * b[3]).abs()) + (r * c[3]).abs()) * share;
         depth - third.z > reach * (2.0 * self.slack + third.z * (NEARER_RATIO - 1.0))
     }
 }
