@@ -1,5 +1,5 @@
-// Depths that are compared: what rounding does to them, and the slope of a triangle's depth on
-// screen, given its corners times their W. Twin of src/backend/cpu/geometry/steepness.rs.
+// Depths that are compared: what rounding does to them, the slope of a triangle's depth on screen, given its
+// corners times their W, and the weights of its corners' depths in a point. Twin of src/backend/cpu/geometry/steepness.rs.
 
 // Smallest ratio of the depth of what lies in front of a line to the line's: covers the rounding of
 // f32.
@@ -39,4 +39,13 @@ fn cofactors(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
 
 fn sum3(v: vec3<f32>) -> f32 {
     return rn(v.x + v.y) + v.z;
+}
+
+// Per side of a triangle, twice the area that it spans with a point; positive inside.
+fn sides_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>, at: vec2<f32>, is_clockwise: bool) -> vec3<f32> {
+    let a = rn2(p.xy - rn2(at * p.w));
+    let b = rn2(q.xy - rn2(at * q.w));
+    let c = rn2(r.xy - rn2(at * r.w));
+    let sides = rn3(vec3(b.x, c.x, a.x) * vec3(c.y, a.y, b.y)) - rn3(vec3(b.y, c.y, a.y) * vec3(c.x, a.x, b.x));
+    return select(-sides, sides, is_clockwise);
 }

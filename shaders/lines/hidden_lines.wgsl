@@ -332,15 +332,6 @@ fn slack_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>) -> f32 {
     return select(steep, rn(steep * SNAP_ERROR), steep >= 0.0);
 }
 
-// Per side of a triangle, twice the area that it spans with a point; positive inside.
-fn sides_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>, at: vec2<f32>, is_clockwise: bool) -> vec3<f32> {
-    let a = rn2(p.xy - rn2(at * p.w));
-    let b = rn2(q.xy - rn2(at * q.w));
-    let c = rn2(r.xy - rn2(at * r.w));
-    let sides = rn3(vec3(b.x, c.x, a.x) * vec3(c.y, a.y, b.y)) - rn3(vec3(b.y, c.y, a.y) * vec3(c.x, a.x, b.x));
-    return select(-sides, sides, is_clockwise);
-}
-
 // Weights of the corners at t of the way along an edge whose ends have these: not negative.
 fn weights_at(at_start: vec3<f32>, at_end: vec3<f32>, t: f32) -> vec3<f32> {
     return max(at_start + rn3(t * (at_end - at_start)), vec3(0.0));

@@ -53,7 +53,11 @@ fn point_at(s: Segment, t: f32) -> vec2<f32> {
 }
 
 fn homogeneous_of(v: u32) -> vec4<f32> {
-    return homogeneous(vec3(positions[3u * v], positions[3u * v + 1u], positions[3u * v + 2u]));
+    return homogeneous(position_of(v));
+}
+
+fn position_of(v: u32) -> vec3<f32> {
+    return vec3(positions[3u * v], positions[3u * v + 1u], positions[3u * v + 2u]);
 }
 
 // Clips a segment in place. False if nothing is left.

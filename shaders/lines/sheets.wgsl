@@ -63,10 +63,6 @@ fn is_plane_of(edge: vec4<u32>, id: u32) -> bool {
     return true;
 }
 
-fn position_of(v: u32) -> vec3<f32> {
-    return vec3(positions[3u * v], positions[3u * v + 1u], positions[3u * v + 2u]);
-}
-
 // True if the third corner of an edge's face surely lies behind the triangle's plane.
 fn hides_face(
     edge: vec4<u32>, face: u32, p: vec4<f32>, q: vec4<f32>, r: vec4<f32>, is_clockwise: bool, slack: f32,

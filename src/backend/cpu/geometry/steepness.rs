@@ -1,4 +1,5 @@
-//! Depths that are compared: what rounding does to them, and the slope of a triangle's depth on screen.
+//! Depths that are compared: what rounding does to them, the slope of a triangle's depth on screen, and the weights
+//! of its corners' depths in a point.
 //! Twin of `shaders/geometry/steepness.wgsl`.
 
 use super::transform::{ScreenVertex, homogeneous, recip};
@@ -54,4 +55,17 @@ pub fn steepness_of(context: &RasterContext<'_>, id: u32) -> Option<f32> {
 #[inline(always)]
 pub fn corner(v: &ScreenVertex) -> Corner {
     [v.x as f32, v.y as f32, v.z, 1.0]
+}
+
+/// Per side of a triangle, twice the area that it spans with a point; positive inside. Valid for
+/// corners behind the eye too.
+#[inline(always)]
+pub fn sides(corners: &[Corner; 3], [x, y]: [f32; 2], is_clockwise: bool) -> [f32; 3] {
+    let from = |k: usize| [corners[k][0] - x * corners[k][3], corners[k][1] - y * corners[k][3]];
+    let (a, b, c) = (from(0), from(1), from(2));
+    let side = |a: [f32; 2], b: [f32; 2]| {
+        let side = a[0] * b[1] - a[1] * b[0];
+        if is_clockwise { side } else { -side }
+    };
+    [side(b, c), side(c, a), side(a, b)]
 }

@@ -118,16 +118,3 @@ pub fn volume([a, b, c]: &[[f32; 4]; 3]) -> f32 {
     let (x, y, w) = (a[1] * b[3] - a[3] * b[1], a[3] * b[0] - a[0] * b[3], a[0] * b[1] - a[1] * b[0]);
     (x * c[0] + y * c[1]) + w * c[3]
 }
-
-/// Per side of a triangle, twice the area that it spans with a point; positive inside. Valid for
-/// corners behind the eye too.
-#[inline(always)]
-pub fn sides(corners: &[[f32; 4]; 3], [x, y]: [f32; 2], is_clockwise: bool) -> [f32; 3] {
-    let from = |k: usize| [corners[k][0] - x * corners[k][3], corners[k][1] - y * corners[k][3]];
-    let (a, b, c) = (from(0), from(1), from(2));
-    let side = |a: [f32; 2], b: [f32; 2]| {
-        let side = a[0] * b[1] - a[1] * b[0];
-        if is_clockwise { side } else { -side }
-    };
-    [side(b, c), side(c, a), side(a, b)]
-}

@@ -6,14 +6,14 @@
 //! along the edge.
 
 use super::candidates::Candidates;
-use super::contour::{sides, volume};
+use super::contour::volume;
 use super::farthest::Farthest;
 use super::segment::Segment;
 use super::sheets::Sheet;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::is_moderate;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
-use crate::backend::cpu::geometry::steepness::{Corner, NEARER_RATIO, corner, is_far, steepness};
+use crate::backend::cpu::geometry::steepness::{Corner, NEARER_RATIO, corner, is_far, sides, steepness};
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, recip};
 use crate::backend::cpu::geometry::visibility::area;
 use crate::plan::{Edge, LinePass};

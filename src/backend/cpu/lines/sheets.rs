@@ -5,9 +5,8 @@
 //! removal keeps it whatever the rounding of depths says. Seen from below, the floor hides the wall. So it
 //! hides the foot, too.
 
-use super::contour::sides;
 use crate::backend::cpu::RasterContext;
-use crate::backend::cpu::geometry::steepness::{Corner, NEARER_RATIO};
+use crate::backend::cpu::geometry::steepness::{Corner, NEARER_RATIO, sides};
 use crate::backend::cpu::geometry::transform::recip;
 use crate::plan::Edge;
 
