@@ -251,20 +251,21 @@ fn draw_share(first: u32, share: u32, drawn_to: vec2<f32>, thread: u32) -> vec2<
                 // Hidden from here on, perhaps farther than this.
                 hidden_from = min(hidden_from, begin);
                 begin = run.x;
-                if !shows_visible && run.x >= range.y {
-                    interval = vec2(hidden_from, range.y);
-                }
             } else {
                 let end = min(run.y, range.y);
                 let is_gap = begin > range.x && end < range.y;
-                let is_shown = shows_interval(edge, s, vec2(begin, end), is_gap);
-                if shows_visible && is_shown {
+                if !shows_interval(edge, s, vec2(begin, end), is_gap) {
+                    hidden_from = min(hidden_from, begin);
+                } else if shows_visible {
                     interval = vec2(begin, end);
-                } else if !shows_visible && (is_shown || !is_gap) {
+                } else {
                     interval = vec2(hidden_from, begin);
                     hidden_from = BEYOND;
                 }
                 begin = end;
+            }
+            if !shows_visible && begin >= range.y && hidden_from < BEYOND {
+                interval = vec2(hidden_from, range.y);
             }
         }
         if interval.x < interval.y {

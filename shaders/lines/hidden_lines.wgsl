@@ -9,11 +9,10 @@
 const SNAP_ERROR: f32 = 1.25;
 
 // Shortest visible interval, pixels. Shorter ones come from rounding, and their round ends would
-// show as dots.
+// show as dots. A face without a sample may hide longer ones: see `shows_interval`.
 const INTERVAL_MIN_PX: f32 = 0.0625;
 
-// Shortest visible interval between two hidden ones, pixels. A face without a sample may hide longer
-// ones: see `shows_interval`.
+// Shortest visible interval between two hidden ones, pixels.
 const GAP_MIN_PX: f32 = 0.25;
 
 // More than any place on an edge.
@@ -194,14 +193,14 @@ fn joined_run(found: vec2<f32>, begin: f32, thread: u32) -> vec2<f32> {
     return bitcast<vec2<f32>>(workgroupUniformLoad(&run_now));
 }
 
-// True if a visible interval is long enough to be drawn. One between two hidden ones counts as hidden if it is so
-// short that a face there may have no sample, and all samples around it show what is nearer.
+// True if an interval beside a hidden one is visible. One below the smallest length is not, and neither is one so
+// short that a face there may have no sample, if all samples around it show what is nearer.
 fn shows_interval(edge: vec4<u32>, s: Segment, interval: vec2<f32>, is_gap: bool) -> bool {
     let length = interval.y - interval.x;
     if !(length > rn(s.inverse_length * select(INTERVAL_MIN_PX, GAP_MIN_PX, is_gap))) {
         return false;
     }
-    return !is_gap || length > rn(s.inverse_length * batch.unseen_gap) || !is_behind_samples(edge, s, interval);
+    return length > rn(s.inverse_length * batch.unseen_gap) || !is_behind_samples(edge, s, interval);
 }
 
 // True if all samples of the pixel in the middle of an interval show faces nearer than it, none of them the

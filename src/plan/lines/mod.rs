@@ -87,7 +87,7 @@ impl LinePass {
         Self::unseen_width_px(samples)..=8.0
     }
 
-    /// Length of a visible part between two hidden ones, pixels, up to which a face without a sample may hide it. At
+    /// Length of a visible part beside a hidden one, pixels, up to which a face without a sample may hide it. At
     /// most 1 px: an edge is looked at only that far beyond what its line reaches.
     pub fn unseen_gap_px(samples: u32) -> f32 {
         Self::unseen_width_px(samples).min(1.0)

@@ -14,7 +14,7 @@ use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::recip;
 use crate::backend::cpu::isa::LANES;
 use crate::backend::cpu::lines::coverage::BandStrokes;
-use crate::backend::cpu::lines::hidden_lines::{Gaps, HiddenIntervals};
+use crate::backend::cpu::lines::hidden_lines::{HiddenIntervals, Parts};
 use crate::plan::{Edge, LinePass, Shown};
 
 /// Output of a line pass: rows of a band.
@@ -235,11 +235,11 @@ impl<'a> LineDrawer<'a> {
         } else {
             self.hidden.find((self.context, self.band, &mut *self.farthest), edge, segment, range);
         }
-        let gaps = Gaps { context: self.context, band: self.band, edge, segment };
+        let parts = Parts { context: self.context, band: self.band, edge, segment };
         if self.lines.shown == Shown::Visible {
-            self.hidden.visible(&gaps, range, &mut self.intervals);
+            self.hidden.visible(&parts, range, &mut self.intervals);
         } else {
-            self.hidden.hidden(&gaps, &mut self.intervals);
+            self.hidden.hidden(&parts, range, &mut self.intervals);
         }
         !self.intervals.is_empty()
     }

@@ -25,11 +25,10 @@ use crate::plan::{Edge, LinePass};
 pub const SNAP_ERROR: f32 = 1.25;
 
 /// Shortest visible interval, pixels. Shorter ones come from rounding, and their round ends would
-/// show as dots.
+/// show as dots. A face without a sample may hide longer ones: see [`Parts`].
 pub const INTERVAL_MIN_PX: f32 = 1.0 / 16.0;
 
-/// Shortest visible interval between two hidden ones, pixels. A face without a sample may hide longer
-/// ones: see [`Gaps`].
+/// Shortest visible interval between two hidden ones, pixels.
 pub const GAP_MIN_PX: f32 = 1.0 / 4.0;
 
 /// Intervals along an edge in which something hides it, kept from edge to edge.
@@ -151,55 +150,63 @@ impl HiddenIntervals {
         false
     }
 
-    /// Appends the visible intervals of the range to `intervals`, in order, without those below the
-    /// smallest lengths.
+    /// Appends the visible intervals of the range to `intervals`, in order.
     #[inline(always)]
-    pub fn visible(&self, gaps: &Gaps<'_>, range: [f32; 2], intervals: &mut Vec<[f32; 2]>) {
-        let least = gaps.segment.inverse_length * INTERVAL_MIN_PX;
+    pub fn visible(&self, parts: &Parts<'_>, range: [f32; 2], intervals: &mut Vec<[f32; 2]>) {
         if self.hidden.is_empty() {
             intervals.push(range);
             return;
         }
         let mut from = range[0];
         for &[start, end] in &self.hidden {
-            if if from > range[0] { gaps.are_shown([from, start]) } else { start - from > least } {
+            if parts.are_shown([from, start], if from > range[0] { GAP_MIN_PX } else { INTERVAL_MIN_PX }) {
                 intervals.push([from, start]);
             }
             from = from.max(end);
         }
-        if range[1] - from > least {
+        if parts.are_shown([from, range[1]], INTERVAL_MIN_PX) {
             intervals.push([from, range[1]]);
         }
     }
 
-    /// Appends the hidden intervals, merged with those between them that are not visible.
+    /// Appends the intervals of the range between the visible ones to `intervals`, in order.
     #[inline(always)]
-    pub fn hidden(&self, gaps: &Gaps<'_>, intervals: &mut Vec<[f32; 2]>) {
-        for &[start, end] in &self.hidden {
-            match intervals.last_mut() {
-                Some(interval) if !gaps.are_shown([interval[1], start]) => interval[1] = interval[1].max(end),
-                _ => intervals.push([start, end]),
+    pub fn hidden(&self, parts: &Parts<'_>, range: [f32; 2], intervals: &mut Vec<[f32; 2]>) {
+        let first = intervals.len();
+        self.visible(parts, range, intervals);
+        let mut from = range[0];
+        let mut kept = first;
+        for i in first..intervals.len() {
+            let [start, end] = intervals[i];
+            if from < start {
+                intervals[kept] = [from, start];
+                kept += 1;
             }
+            from = end;
+        }
+        intervals.truncate(kept);
+        if from < range[1] {
+            intervals.push([from, range[1]]);
         }
     }
 }
 
-/// Intervals of an edge between two hidden ones.
-pub struct Gaps<'a> {
+/// Parts of an edge beside hidden ones.
+pub struct Parts<'a> {
     pub context: &'a RasterContext<'a>,
     pub band: &'a SampleBand,
     pub edge: &'a Edge,
     pub segment: &'a Segment,
 }
 
-impl Gaps<'_> {
-    /// True if such an interval is visible. A very short one is not, and neither is one so short that a face
-    /// there may have no sample, if all samples around it show what is nearer.
+impl Parts<'_> {
+    /// True if such a part is visible. One below the smallest length is not, and neither is one so short that a
+    /// face there may have no sample, if all samples around it show what is nearer.
     #[inline(always)]
-    fn are_shown(&self, [start, end]: [f32; 2]) -> bool {
+    fn are_shown(&self, [start, end]: [f32; 2], least_px: f32) -> bool {
         let (length, px) = (end - start, self.segment.inverse_length);
         let unseen = px * LinePass::unseen_gap_px(self.context.plan.samples);
-        length > px * GAP_MIN_PX && (length > unseen || !self.are_behind_samples([start, end]))
+        length > px * least_px && (length > unseen || !self.are_behind_samples([start, end]))
     }
 
     /// True if all samples of the pixel in the middle of an interval show faces nearer than it, none of
