@@ -79,7 +79,7 @@ struct Image {
     first_texel: u32,
 };
 
-// Linear RGBA of a texture: the mean of places along the pixel's footprint, each trilinear; white where
+// Linear RGBA of a texture: one place, trilinear, or the mean of places along the pixel's footprint; white where
 // there is no texture. `first_uv` is of the first set of texture coordinates.
 fn sample_texture(m: u32, slot: u32, id: u32, b: Barycentrics, first_uv: Uv) -> vec4<f32> {
     let used = use_of(m, slot);
@@ -102,11 +102,25 @@ fn sample_texture(m: u32, slot: u32, id: u32, b: Barycentrics, first_uv: Uv) -> 
     if footprint.taps < 2u {
         return place_color(image, footprint, at, used.sampler);
     }
-    let share = quick_recip(f32(footprint.taps));
+    return mean_of_places(image, footprint, at, used.sampler);
+}
+
+// The mean of the colours at two or more places, each in one level. Those of the second level are spread
+// over the axis.
+fn mean_of_places(image: Image, footprint: Footprint, at: vec2<f32>, sampler: u32) -> vec4<f32> {
+    let taps = footprint.taps;
+    let share = quick_recip(f32(taps));
+    let level = u32(footprint.lod);
+    let of_next = u32(rn(f32(taps) * (footprint.lod - f32(level))));
     var sum = vec4(0.0);
-    for (var tap = 0u; tap < footprint.taps; tap++) {
+    var part = taps / 2u;
+    for (var tap = 0u; tap < taps; tap++) {
         let along = rn((f32(tap) + 0.5) * share) - 0.5;
-        sum += place_color(image, footprint, at + rn2(footprint.axis * along), used.sampler);
+        part += of_next;
+        let is_next = part >= taps;
+        part -= select(0u, taps, is_next);
+        let color = bilinear(image, level + u32(is_next), at + rn2(footprint.axis * along), sampler);
+        sum += cut_out(color, footprint.magnification, sampler);
     }
     return rn4(sum * share);
 }
@@ -173,21 +187,23 @@ fn lod_of(image: Image, size_square: f32) -> f32 {
     return max(min(half_log2(size_square), f32(image.levels) - 1.0), f32(image.first_level));
 }
 
-// A place of a footprint.
+// The only place of a footprint.
 fn place_color(image: Image, footprint: Footprint, at: vec2<f32>, sampler: u32) -> vec4<f32> {
     let color = filtered(image, footprint.lod, at, sampler);
-    if (sampler & SAMPLER_CUT_OUT) == 0u {
-        return color;
+    if (sampler & SAMPLER_NEAREST) == 0u {
+        return cut_out(color, footprint.magnification, sampler);
     }
-    var magnification = footprint.magnification;
-    if (sampler & SAMPLER_NEAREST) != 0u {
-        // Texels of the finest level are drawn whole or not at all.
-        if u32(footprint.lod + 0.5) <= image.first_level {
-            return vec4(color.xyz, select(0.0, 1.0, color.w >= 0.0));
-        }
-        magnification = 1.0;
+    // Texels of the finest level are drawn whole or not at all.
+    if (sampler & SAMPLER_CUT_OUT) != 0u && u32(footprint.lod + 0.5) <= image.first_level {
+        return vec4(color.xyz, select(0.0, 1.0, color.w >= 0.0));
     }
-    return vec4(color.xyz, clamp(rn(color.w * magnification) + 0.5, 0.0, 1.0));
+    return cut_out(color, 1.0, sampler);
+}
+
+// A colour; of a cut-out texture alpha becomes the share of the pixel that is drawn.
+fn cut_out(color: vec4<f32>, magnification: f32, sampler: u32) -> vec4<f32> {
+    let drawn = clamp(rn(color.w * magnification) + 0.5, 0.0, 1.0);
+    return vec4(color.xyz, select(color.w, drawn, (sampler & SAMPLER_CUT_OUT) != 0u));
 }
 
 fn filtered(image: Image, lod: f32, at: vec2<f32>, sampler: u32) -> vec4<f32> {

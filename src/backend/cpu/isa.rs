@@ -43,7 +43,7 @@ enum Level {
 macro_rules! for_avx2_features {
     ($($callback:ident)::+ ! { $($input:tt)* }) => {
         $($callback)::+! {
-            ["sse3" "ssse3" "sse4.1" "sse4.2" "avx" "avx2" "bmi1" "bmi2" "lzcnt" "popcnt"]
+            ["sse3" "ssse3" "sse4.1" "sse4.2" "avx" "avx2" "f16c" "bmi1" "bmi2" "lzcnt" "popcnt"]
             $($input)*
         }
     };

@@ -29,9 +29,9 @@ const REPEATS: f64 = 12.0;
 /// Error as a share of trilinear filtering's, at a slant.
 const GOAL: f64 = 1.0 / 3.0;
 
-/// The same of noise, which misses the goal: neighbouring texels say nothing of each other, so that a place between
-/// two levels is mostly wrong across the footprint, too, and only the mean of many places is right.
-const OF_NOISE: f64 = 0.65;
+/// The same of noise, which misses the goal: neighbouring texels say nothing of each other, so that a place
+/// is mostly wrong across the footprint, too, and only the mean of many places is right.
+const OF_NOISE: f64 = 0.75;
 
 /// A camera above the floor y = 0.
 struct View {

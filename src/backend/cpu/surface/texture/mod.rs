@@ -241,39 +241,64 @@ fn averaged(
     }
     let share_of_next = lod - (lod as u32) as f32;
     let level = Level::of(image, lod as u32);
-    let levels = (level, (share_of_next > 0.0).then(|| (level.next(), share_of_next)));
+    let next = (share_of_next > 0.0).then(|| level.next());
     if taps < 2 {
-        let color = trilinear(isa, texels, levels, at, sampler);
+        let color = trilinear(isa, texels, (level, next.map(|next| (next, share_of_next))), at, sampler);
         return if is_cut_out { cut_out(color, magnification) } else { color };
     }
+    let places = Places { at, axis, taps, levels: [level, next.unwrap_or(level)], share_of_next };
     #[cfg(target_arch = "x86_64")]
     if isa.has_avx2() && !is_cut_out {
-        // SAFETY: the processor has AVX2, as `isa` says.
-        return unsafe { avx2::mean(texels, levels, (at, axis), taps, sampler) };
+        // SAFETY: the processor has AVX2 and F16C, as `isa` says.
+        return unsafe { avx2::mean(texels, &places, sampler) };
     }
-    mean_plainly((at, axis), taps, |place| {
-        let color = trilinear(isa, texels, levels, place, sampler);
+    mean_plainly(&places, |place, level| {
+        let color = bilinear(texels, level, place, sampler);
         if is_cut_out { cut_out(color, magnification) } else { color }
     })
 }
 
-/// The mean of the colours at places along an axis, side by side around a place.
-#[inline(always)]
-fn mean_plainly(
-    (at, axis): ([f32; 2], [f32; 2]),
+/// Two or more places of a footprint, side by side along its axis.
+struct Places {
+    /// In their middle.
+    at: [f32; 2],
+    axis: [f32; 2],
     taps: u32,
-    mut color_at: impl FnMut([f32; 2]) -> [f32; 4],
-) -> [f32; 4] {
-    let share = quick_recip(taps as f32);
+    /// Each place is looked at in one of the two.
+    levels: [Level; 2],
+    /// The share of places that are looked at in the second level.
+    share_of_next: f32,
+}
+
+impl Places {
+    /// The places, each with the number of its level. Those of the second level are spread over the axis.
+    #[inline(always)]
+    fn iter(&self) -> impl Iterator<Item = ([f32; 2], usize)> {
+        let &Self { at, axis, taps, share_of_next, .. } = self;
+        let share = quick_recip(taps as f32);
+        let of_next = (taps as f32 * share_of_next) as u32;
+        let mut part = taps / 2;
+        (0..taps).map(move |tap| {
+            let along = (tap as f32 + 0.5) * share - 0.5;
+            part += of_next;
+            let is_next = part >= taps;
+            part -= if is_next { taps } else { 0 };
+            ([at[0] + axis[0] * along, at[1] + axis[1] * along], usize::from(is_next))
+        })
+    }
+}
+
+/// The mean of the colours at places.
+#[inline(always)]
+fn mean_plainly(places: &Places, mut color_at: impl FnMut([f32; 2], Level) -> [f32; 4]) -> [f32; 4] {
     let mut sum = [0.0; 4];
-    for tap in 0..taps {
-        let along = (tap as f32 + 0.5) * share - 0.5;
-        let color = color_at([at[0] + axis[0] * along, at[1] + axis[1] * along]);
+    for (place, level) in places.iter() {
+        let color = color_at(place, places.levels[level]);
         for k in 0..4 {
             sum[k] += color[k];
         }
     }
-    sum.map(|v| v * share)
+    sum.map(|v| v * quick_recip(places.taps as f32))
 }
 
 /// A colour of a cut-out texture: alpha is the share of the pixel that is drawn.
@@ -294,7 +319,7 @@ fn trilinear(
 ) -> [f32; 4] {
     #[cfg(target_arch = "x86_64")]
     if isa.has_avx2() {
-        // SAFETY: the processor has AVX2, as `isa` says.
+        // SAFETY: the processor has AVX2 and F16C, as `isa` says.
         return unsafe { avx2::trilinear(texels, levels, at, sampler) };
     }
     let _ = isa;
@@ -447,9 +472,10 @@ mod tests {
             #[cfg(target_arch = "x86_64")]
             if Isa::detect().has_avx2() {
                 let (axis, taps) = ([0.3 * v, share], 2 + case as u32 % 7);
-                let want = mean_plainly((at, axis), taps, |at| trilinear_plainly(&texels, pair, at, sampler));
-                // SAFETY: the processor has AVX2, as was asked.
-                let got = unsafe { avx2::mean(&texels, pair, (at, axis), taps, sampler) };
+                let places = Places { at, axis, taps, levels: [pair.0, levels[first + 1]], share_of_next: share };
+                let want = mean_plainly(&places, |at, level| bilinear(&texels, level, at, sampler));
+                // SAFETY: the processor has AVX2 and F16C, as was asked.
+                let got = unsafe { avx2::mean(&texels, &places, sampler) };
                 assert_eq!(got.map(f32::to_bits), want.map(f32::to_bits), "{at:?}, {axis:?}, {taps}, {sampler}");
             }
             for isa in Isa::available() {
