@@ -79,8 +79,8 @@ struct Image {
     first_texel: u32,
 };
 
-// Linear RGBA of a texture: one place, trilinear, or the mean of places along the pixel's footprint; white where
-// there is no texture. `first_uv` is of the first set of texture coordinates.
+// Linear RGBA of a texture: one place, trilinear, or the mean of places along the pixel's footprint, each in one
+// level; white where there is no texture. `first_uv` is of the first set of texture coordinates.
 fn sample_texture(m: u32, slot: u32, id: u32, b: Barycentrics, first_uv: Uv) -> vec4<f32> {
     let used = use_of(m, slot);
     if used.texture >= frame.image_count {
@@ -129,7 +129,7 @@ fn mean_of_places(image: Image, footprint: Footprint, at: vec2<f32>, sampler: u3
 struct Footprint {
     // Places that are looked at, side by side along the axis.
     taps: u32,
-    // Level of each.
+    // Level of the footprint: its places lie in the two levels around it.
     lod: f32,
     // The footprint's longer axis from end to end, in texture coordinates; 0 for one place.
     axis: vec2<f32>,

@@ -101,7 +101,8 @@ fn draw(plan: &mut DrawPlan<'_>, shown: Shown, edges: Vec<Edge>, name: &str) -> 
     Some(cpu)
 }
 
-/// Lines behind a wall: ends of their pieces in order, which are in the middles of strips, or only the lines' ends.
+/// Lines behind a wall: of each, the ends of its pieces in order. These are the line's ends and, in pieces, the middles
+/// of strips.
 fn lines(slope: i16, width_px: f32, in_pieces: bool) -> Vec<Vec<[f32; 3]>> {
     let row = |k: i32, x: f32| k as f32 * 7.13 + (x + 70.0) / 140.0;
     let middle = |k: i32, at: f32| {

@@ -1,8 +1,8 @@
-//! Stage shade, per place of a texture: texture lookups in AVX2 instructions. A vector holds the coordinates of a place in two levels,
-//! or of two places, another the four components of a texel.
+//! Stage shade, per place of a texture: texture lookups in AVX2 and F16C instructions. A vector holds the coordinates of
+//! a place in two levels, or of two places, another the four components of a texel.
 //!
-//! The same bits as [`trilinear_plainly`](super::trilinear_plainly), of which compilers
-//! make branches and single components.
+//! The same bits as [`trilinear_plainly`](super::trilinear_plainly) and [`mean_plainly`](super::mean_plainly), of which
+//! compilers make branches and single components.
 
 #![allow(unsafe_code)]
 
@@ -128,7 +128,7 @@ fn within(i: __m128i, sizes: __m128i, repeats: __m128i) -> __m128i {
     _mm_blendv_epi8(clamped, _mm_sub_epi32(_mm_add_epi32(i, added), taken), repeats)
 }
 
-/// A texel; white beyond the last.
+/// A texel; white beyond the last. As `half_to_f32` for finite halves, and no texel is anything else.
 #[inline]
 #[target_feature(enable = "avx2,f16c")]
 fn texel(texels: &[[u16; 4]], index: u32) -> __m128 {

@@ -92,8 +92,8 @@ pub fn blend<const K: usize, const N: usize>([p, q, r]: &[[[f32; N]; K]; 3], w: 
     out
 }
 
-/// Linear RGBA of a texture: the mean of places along the pixel's footprint, each trilinear; white where there is
-/// no texture ([`TEXTURE_NONE`](crate::plan::TEXTURE_NONE)). Up to `taps_max` places are looked at.
+/// Linear RGBA of a texture: one place, trilinear, or the mean of places along the pixel's footprint, each in one
+/// level; white where there is no texture ([`TEXTURE_NONE`](crate::plan::TEXTURE_NONE)). Up to `taps_max` places are looked at.
 #[inline(always)]
 pub fn sample<const N: usize>(
     isa: Isa,
@@ -134,7 +134,7 @@ pub fn sample<const N: usize>(
 struct Footprint {
     /// Places that are looked at, side by side along the axis.
     taps: u32,
-    /// Level of each.
+    /// Level of the footprint: its places lie in the two levels around it.
     lod: f32,
     /// The footprint's longer axis from end to end, in texture coordinates.
     axis: [f32; 2],
@@ -253,7 +253,7 @@ fn averaged(
         return unsafe { avx2::mean(texels, &places, sampler) };
     }
     mean_plainly(&places, |place, level| {
-        let color = bilinear(texels, level, place, sampler);
+        let color = trilinear(isa, texels, (level, None), place, sampler);
         if is_cut_out { cut_out(color, magnification) } else { color }
     })
 }
@@ -439,6 +439,26 @@ mod tests {
         for (half, want) in [(0, 0.0), (0x3C00, 1.0), (0x3555, 0.333_251_95), (0x7BFF, 65504.0), (1, 5.960_464_5e-8)] {
             assert_eq!(half_to_f32(half), want);
             assert_eq!(half_to_f32(half | 0x8000), -want);
+        }
+    }
+
+    #[test]
+    fn places_of_two_levels_take_turns() {
+        let levels = [8, 4].map(|side| Level { first: 0, size: [side; 2] });
+        for taps in 2..=8 {
+            for sixteenths in 0..16 {
+                let share_of_next = sixteenths as f32 / 16.0;
+                let places = Places { at: [0.5; 2], axis: [1.0, 0.0], taps, levels, share_of_next };
+                let of_next = taps * sixteenths / 16;
+                let coarse: Vec<u32> = (0..).zip(places.iter()).filter(|(_, (_, i))| *i == 1).map(|(n, _)| n).collect();
+                assert_eq!(coarse.len() as u32, of_next, "{taps} places, {share_of_next}");
+                for pair in coarse.windows(2) {
+                    let steps = pair[1] - pair[0];
+                    assert!(steps == taps / of_next || steps == taps.div_ceil(of_next), "{taps} places: {coarse:?}");
+                }
+                let middle = places.iter().map(|([u, _], _)| u).sum::<f32>() / taps as f32;
+                assert!((middle - 0.5).abs() < 1e-5 && places.iter().all(|([u, _], _)| u > 0.0 && u < 1.0));
+            }
         }
     }
 
