@@ -222,11 +222,16 @@ fn crowded_pixels_have_the_same_bytes() {
         assert!(mixed >= 4, "{name}");
         assert!(size != "420" || mixed > 2 * 32_768, "{mixed} mixed pixels are one round");
         for gpu in &mut gpus {
-            let before = gpu.gpu().pictures_drawn_again();
-            let found = draw(gpu, &plan);
-            assert_eq!(gpu.gpu().pictures_drawn_again() - before, usize::from(is_again), "{name}");
-            assert_eq!(gpu.draw_times().mixed_pixels, mixed, "{name}");
-            Likeness::of(&found, &want).assert(Tolerance::TWINS, &name);
+            // The device counts pictures of other tests, too, that run at the same time.
+            let mut tries = (0..3).map(|_| {
+                let before = gpu.gpu().pictures_drawn_again();
+                let found = draw(gpu, &plan);
+                let again = gpu.gpu().pictures_drawn_again() - before;
+                assert_eq!(gpu.draw_times().mixed_pixels, mixed, "{name}");
+                Likeness::of(&found, &want).assert(Tolerance::TWINS, &name);
+                again
+            });
+            assert!(tries.any(|again| again == usize::from(is_again)), "{name}");
         }
     }
 }
