@@ -125,11 +125,11 @@ struct Batch {
     part_capacity: u32,
     // The line pass's, see LinePass::tint_reach in src/plan/lines/mod.rs.
     tint_reach: f32,
-    // The picture's, see LinePass::unseen_gap_px there.
-    unseen_gap: f32,
+    // The line pass's, see LinePass::unseen_part_px and LinePass::farther_samples_max there.
+    unseen_part: f32,
+    farther_samples: u32,
     // A gang has an array of these, whose stride must be a multiple of 16.
-    padding_a: u32,
-    padding_b: u32,
+    padding: u32,
 };
 
 // Threads of a workgroup, in every kernel.

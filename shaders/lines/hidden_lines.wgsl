@@ -194,30 +194,32 @@ fn joined_run(found: vec2<f32>, begin: f32, thread: u32) -> vec2<f32> {
 }
 
 // True if an interval beside a hidden one is visible. One below the smallest length is not, and neither is one so
-// short that a face there may have no sample, if all samples around it show what is nearer.
+// short that a face there may have no sample, if the samples around it show what is nearer.
 fn shows_interval(edge: vec4<u32>, s: Segment, interval: vec2<f32>, is_gap: bool) -> bool {
     let length = interval.y - interval.x;
     if !(length > rn(s.inverse_length * select(INTERVAL_MIN_PX, GAP_MIN_PX, is_gap))) {
         return false;
     }
-    return length > rn(s.inverse_length * batch.unseen_gap) || !is_behind_samples(edge, s, interval);
+    return length > rn(s.inverse_length * batch.unseen_part) || !is_behind_samples(edge, s, interval);
 }
 
-// True if all samples of the pixel in the middle of an interval show faces nearer than it, none of them the
-// edge's own.
+// True if the samples of the pixel in the middle of an interval show faces nearer than it, but for
+// `farther_samples`, and none of them the edge's own.
 fn is_behind_samples(edge: vec4<u32>, s: Segment, interval: vec2<f32>) -> bool {
     let pixel = vec2<i32>(floor(point_at(s, rn((interval.x + interval.y) * 0.5))));
     if !has_samples(pixel) {
         return false;
     }
     let nearest = rn(max(depth_of(s, interval.x), depth_of(s, interval.y)) * NEARER_RATIO);
+    var farther = 0u;
     for (var i = 0u; i < u32(sample_count()); i++) {
         let seen = seen_at(pixel, i);
-        if seen.x == edge.z || seen.x == edge.w || !(bitcast<f32>(seen.y) > nearest) {
+        farther += u32(bitcast<f32>(seen.y) <= nearest);
+        if seen.x != NOTHING && (seen.x == edge.z || seen.x == edge.w) {
             return false;
         }
     }
-    return true;
+    return farther <= batch.farther_samples;
 }
 
 // A run from `begin` with one more hidden interval.

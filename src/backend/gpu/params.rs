@@ -120,9 +120,9 @@ pub struct Batch {
     pub list_capacity: u32,
     pub part_capacity: u32,
     pub tint_reach: f32,
-    pub unseen_gap: f32,
-    pub padding_a: u32,
-    pub padding_b: u32,
+    pub unseen_part: f32,
+    pub farther_samples: u32,
+    pub padding: u32,
 }
 
 /// Bits of [`Batch::line_flags`].

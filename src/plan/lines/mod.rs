@@ -88,9 +88,16 @@ impl LinePass {
     }
 
     /// Length of a visible part beside a hidden one, pixels, up to which a face without a sample may hide it. At
-    /// most 1 px: an edge is looked at only that far beyond what its line reaches.
-    pub fn unseen_gap_px(samples: u32) -> f32 {
-        Self::unseen_width_px(samples).min(1.0)
+    /// most 1 px: an edge is looked at only that far beyond what its line reaches. 0 where all edges are drawn: the
+    /// lines along the face's own edges cover what it hides.
+    pub fn unseen_part_px(&self, samples: u32) -> f32 {
+        if self.is_complete { 0.0 } else { Self::unseen_width_px(samples).min(1.0) }
+    }
+
+    /// Number of a pixel's samples that may show something farther than such a part, while it is still taken for
+    /// hidden. Beyond a contour lies what is farther than its face.
+    pub fn farther_samples_max(&self, samples: u32) -> u32 {
+        if self.contour { samples / 4 } else { 0 }
     }
 
     /// Pixels up to this far from one in which a face is hidden in part are marked: the visible part

@@ -1,4 +1,4 @@
-//! The GPU that all tests share.
+//! The GPU that all tests share, and others for tests that count what their own draws.
 
 use std::sync::{Arc, OnceLock};
 
@@ -12,22 +12,34 @@ use super::skip::{Need, skip};
 #[track_caller]
 pub fn gpus() -> Option<&'static [Arc<Gpu>; 2]> {
     static GPUS: OnceLock<Option<[Arc<Gpu>; 2]>> = OnceLock::new();
-    let opened = GPUS.get_or_init(|| {
-        let open = |atomics| Gpu::open(GpuKind::Any, atomics, None).map(Arc::new);
-        match (open(AtomicsChoice::Best), open(AtomicsChoice::Force32)) {
-            (Ok(best), Ok(force32)) => {
-                println!("GPU: {:?}", best.info());
-                Some([best, force32])
-            }
-            (Err(DrawError::NoGpu(reason)), _) => {
-                println!("no Vulkan here: {reason}");
-                None
-            }
-            (a, b) => panic!("{:?} {:?}", a.err(), b.err()),
-        }
-    });
+    let opened = GPUS.get_or_init(open);
     if opened.is_none() {
         skip(Need::Gpu, "Vulkan");
     }
     opened.as_ref()
+}
+
+/// As [`gpus`], and no other test draws on them.
+#[track_caller]
+pub fn own_gpus() -> Option<[Arc<Gpu>; 2]> {
+    let opened = open();
+    if opened.is_none() {
+        skip(Need::Gpu, "Vulkan");
+    }
+    opened
+}
+
+fn open() -> Option<[Arc<Gpu>; 2]> {
+    let open = |atomics| Gpu::open(GpuKind::Any, atomics, None).map(Arc::new);
+    match (open(AtomicsChoice::Best), open(AtomicsChoice::Force32)) {
+        (Ok(best), Ok(force32)) => {
+            println!("GPU: {:?}", best.info());
+            Some([best, force32])
+        }
+        (Err(DrawError::NoGpu(reason)), _) => {
+            println!("no Vulkan here: {reason}");
+            None
+        }
+        (a, b) => panic!("{:?} {:?}", a.err(), b.err()),
+    }
 }

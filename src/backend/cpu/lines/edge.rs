@@ -235,7 +235,7 @@ impl<'a> LineDrawer<'a> {
         } else {
             self.hidden.find((self.context, self.band, &mut *self.farthest), edge, segment, range);
         }
-        let parts = Parts { context: self.context, band: self.band, edge, segment };
+        let parts = Parts { context: self.context, lines: self.lines, band: self.band, edge, segment };
         if self.lines.shown == Shown::Visible {
             self.hidden.visible(&parts, range, &mut self.intervals);
         } else {

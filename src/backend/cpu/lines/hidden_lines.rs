@@ -194,6 +194,7 @@ impl HiddenIntervals {
 /// Parts of an edge beside hidden ones.
 pub struct Parts<'a> {
     pub context: &'a RasterContext<'a>,
+    pub lines: &'a LinePass,
     pub band: &'a SampleBand,
     pub edge: &'a Edge,
     pub segment: &'a Segment,
@@ -201,16 +202,16 @@ pub struct Parts<'a> {
 
 impl Parts<'_> {
     /// True if such a part is visible. One below the smallest length is not, and neither is one so short that a
-    /// face there may have no sample, if all samples around it show what is nearer.
+    /// face there may have no sample, if the samples around it show what is nearer.
     #[inline(always)]
     fn are_shown(&self, [start, end]: [f32; 2], least_px: f32) -> bool {
         let (length, px) = (end - start, self.segment.inverse_length);
-        let unseen = px * LinePass::unseen_gap_px(self.context.plan.samples);
+        let unseen = px * self.lines.unseen_part_px(self.context.plan.samples);
         length > px * least_px && (length > unseen || !self.are_behind_samples([start, end]))
     }
 
-    /// True if all samples of the pixel in the middle of an interval show faces nearer than it, none of
-    /// them the edge's own.
+    /// True if the samples of the pixel in the middle of an interval show faces nearer than it, but for
+    /// [`LinePass::farther_samples_max`], and none of them the edge's own.
     fn are_behind_samples(&self, [start, end]: [f32; 2]) -> bool {
         let [x, y] = self.segment.point((start + end) * 0.5).map(|v| v.floor() as i32);
         if !self.band.has(x, y) {
@@ -218,7 +219,9 @@ impl Parts<'_> {
         }
         let nearest = self.segment.depth(start).max(self.segment.depth(end)) * NEARER_RATIO;
         let (ids, depths) = self.band.pixel(x, y);
-        ids.iter().zip(depths).all(|(id, depth)| !self.edge.faces.contains(id) & (*depth > nearest))
+        let farther = depths.iter().filter(|depth| **depth <= nearest).count() as u32;
+        farther <= self.lines.farther_samples_max(ids.len() as u32)
+            && !ids.iter().any(|id| self.edge.faces.contains(id) & (*id != NOTHING))
     }
 }
 

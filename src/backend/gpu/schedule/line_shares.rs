@@ -156,7 +156,8 @@ impl Schedule {
                 line_width: lines.width_px,
                 line_smoothing: lines.smoothing_px,
                 tint_reach: lines.tint_reach(),
-                unseen_gap: LinePass::unseen_gap_px(plan.samples),
+                unseen_part: lines.unseen_part_px(plan.samples),
+                farther_samples: lines.farther_samples_max(plan.samples),
                 line_flags: line_flags::of(plan, lines, has_visibility(plan)) | first,
                 line_pass: pass,
                 ..pixels
