@@ -30,8 +30,8 @@ use super::gpu::schedule::sizes::{
 use super::gpu::schedule::{PIECES_MAX, WORKGROUP, line_shares, tiles};
 use super::sample_partition::{GENERATORS, POINTS};
 use crate::plan::{
-    ALPHA_MIN, Edge, HullVertex, LinePass, MIRROR_ROUGHNESS, ShadedMaterial, TAPS_PER_PIXEL, TEXTURE_NONE, TINTS,
-    Texture, debug_views, flags, pass_mask, sample_offsets, samplers, slots,
+    ALPHA_MIN, Edge, HullVertex, LinePass, MIRROR_ROUGHNESS, OutermostSamples, ShadedMaterial, TAPS_PER_PIXEL,
+    TEXTURE_NONE, TINTS, Texture, debug_views, flags, pass_mask, sample_offsets, samplers, slots,
 };
 
 /// Every constant that a shader and Rust both have, as the shader calls it.
@@ -132,11 +132,14 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("FEW_FIRST" = points::Lattice::<1>::FIRST, "EDGE_MAX" = triangle::EDGE_MAX);
     let of_all_levels = |places: u8| places | places << breaks::HARD;
     add!(
-        "OWN_PLACES" = of_all_levels(breaks::OWN),
-        "LEFT_PLACES" = of_all_levels(breaks::OWN | breaks::LEFT),
-        "UPPER_PLACES" = of_all_levels(breaks::OWN | breaks::UPPER),
+        "OWN_PLACES" = breaks::OWN << breaks::HARD,
+        "LEFT_PLACES" = of_all_levels(breaks::LEFT) | breaks::OWN << breaks::HARD,
+        "UPPER_PLACES" = of_all_levels(breaks::UPPER) | breaks::OWN << breaks::HARD,
         "HARD_PLACES" = (breaks::OWN | breaks::LEFT | breaks::UPPER | breaks::THIN) << breaks::HARD,
     );
+    let outermost = |OutermostSamples { left, right, top, bottom }| left | right << 4 | top << 8 | bottom << 12;
+    add!("FOUR_OUTERMOST" = outermost(OutermostSamples::OF_FOUR));
+    add!("SIXTEEN_OUTERMOST" = outermost(OutermostSamples::OF_SIXTEEN));
     // Occlusion.
     add!("NOWHERE" = occlusion::grid::NOWHERE, "BIAS" = occlusion::gather::BIAS, "GAIN" = occlusion::gather::GAIN);
     add!("SHOULDER" = light::SHOULDER);

@@ -213,6 +213,31 @@ impl<'a> DrawPlan<'a> {
     }
 }
 
+/// Numbers of a pixel's samples that lie closest to its sides, of 4 samples and of 16.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OutermostSamples {
+    /// The leftmost.
+    pub left: usize,
+    /// The rightmost.
+    pub right: usize,
+    /// The topmost.
+    pub top: usize,
+    /// The lowest.
+    pub bottom: usize,
+}
+
+impl OutermostSamples {
+    /// Those of 4 samples.
+    pub const OF_FOUR: Self = Self { left: 2, right: 1, top: 0, bottom: 3 };
+    /// Those of 16 samples.
+    pub const OF_SIXTEEN: Self = Self { left: 12, right: 13, top: 15, bottom: 14 };
+
+    /// Those of 4 samples or of 16.
+    pub fn of(samples: u32) -> Self {
+        if samples == 4 { Self::OF_FOUR } else { Self::OF_SIXTEEN }
+    }
+}
+
 /// Sample positions inside a pixel, in 1/256 pixel from its upper left corner: the standard
 /// patterns of Direct3D 11 and Vulkan.
 ///
@@ -263,6 +288,17 @@ pub fn sample_offsets(samples: u32) -> &'static [[i32; 2]] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn outermost_samples_are_closest_to_the_sides() {
+        for samples in [4, 16] {
+            let (offsets, outermost) = (sample_offsets(samples), OutermostSamples::of(samples));
+            let at_most = |k: usize, s: usize| offsets.iter().all(|at| offsets[s][k] <= at[k]);
+            let at_least = |k: usize, s: usize| offsets.iter().all(|at| offsets[s][k] >= at[k]);
+            assert!(at_most(0, outermost.left) && at_least(0, outermost.right), "{samples}");
+            assert!(at_most(1, outermost.top) && at_least(1, outermost.bottom), "{samples}");
+        }
+    }
 
     #[test]
     fn samples_are_spread_evenly() {

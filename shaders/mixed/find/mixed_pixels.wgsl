@@ -5,11 +5,11 @@
 // Peeled layers per sample.
 @group(1) @binding(27) var<storage, read> peel_state: array<PeelState>;
 
-// Places where colours break off, slightly or more, that concern the pixel itself, the one on its right, and the one
-// below it.
-const OWN_PLACES: u32 = 0x11u;
-const LEFT_PLACES: u32 = 0x33u;
-const UPPER_PLACES: u32 = 0x55u;
+// Places where colours break off that concern all pixels beside the one that has them, and also the one on its left,
+// and the one above it. In the pixel itself more than slightly, on the way to it slightly or more.
+const OWN_PLACES: u32 = 0x10u;
+const LEFT_PLACES: u32 = 0x32u;
+const UPPER_PLACES: u32 = 0x54u;
 const HARD_PLACES: u32 = 0xF0u;
 
 @compute @workgroup_size(WORKGROUP)

@@ -5,9 +5,9 @@
 
 // From the pixel's first sample to its others, one after the other.
 const BREAKS_OWN: u32 = 1u;
-// From the first sample of the pixel on the left to this one's.
+// From the rightmost sample of the pixel on the left to the leftmost of this one.
 const BREAKS_LEFT: u32 = 2u;
-// The same from the pixel above.
+// From the lowest sample of the pixel above to the topmost of this one.
 const BREAKS_UPPER: u32 = 4u;
 // To a thin triangle in the pixel that no sample need see.
 const BREAKS_THIN: u32 = 8u;

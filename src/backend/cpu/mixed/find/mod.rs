@@ -1,10 +1,10 @@
 //! Stage mixed, per pixel: finds the mixed pixels.
 //!
-//! A pixel is mixed if its samples and those of its four neighbours show several faces (or a face and
-//! nothing) and colours break off from one to the next ([`Pairs::step`]). Where an edge goes through a pixel
-//! without parting its samples, it parts those of neighbours. Pixels of thin triangles are mixed, too, which no
-//! sample need see ([`thin`]). Pixels in which a layer is seen are not mixed: layers are composited
-//! sample by sample.
+//! A pixel is mixed if its samples show several faces (or a face and nothing) and colours break off from one to the
+//! next ([`Pairs::step`]), or between the samples on both sides of one of its sides. Where an edge cuts off a corner of
+//! a pixel without parting its samples, it parts those of a neighbour: a pixel is mixed, too, if colours break off more
+//! than slightly in one of its four neighbours. Pixels of thin triangles are mixed, which no sample need see ([`thin`]).
+//! Pixels in which a layer is seen are not mixed: layers are composited sample by sample.
 //!
 //! Most pixels are passed over quickly: all their samples show one face ([`differing`]), or faces that look alike
 //! ([`coarse`]).
@@ -29,20 +29,24 @@ use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::isa::dispatch;
 use crate::backend::cpu::peeling::state::PeelBand;
+use crate::plan::OutermostSamples;
 
 /// Places where colours break off from sample to sample, slightly or more.
 pub mod breaks {
     /// From the pixel's first sample to its others, one after the other.
     pub const OWN: u8 = 1;
-    /// From the first sample of the pixel on the left to this one's.
+    /// From the rightmost sample of the pixel on the left to the leftmost of this one.
     pub const LEFT: u8 = 2;
-    /// The same from the pixel above.
+    /// From the lowest sample of the pixel above to the topmost of this one.
     pub const UPPER: u8 = 4;
     /// To a thin triangle in the pixel that no sample need see.
     pub const THIN: u8 = 8;
     /// From the bits above to those of the same places where colours break off more than slightly.
     pub const HARD: u32 = 4;
 }
+
+/// Of pixels of four samples.
+const OUTERMOST: OutermostSamples = OutermostSamples::OF_FOUR;
 
 /// Values of a row's pixels, and of one more on each side.
 #[derive(Default)]
@@ -169,11 +173,12 @@ fn leave_layers(layers: &PeelBand, y: u32, marks: &mut [u8]) {
     }
 }
 
-/// Marks the mixed pixels of a row: those where colours break off in the pixel, in one beside, above or below it, or on
-/// the way from its first sample to theirs. Given are the breaks of the row above, of its own and of the one below.
+/// Marks the mixed pixels of a row: those where colours break off in the pixel, or on the way from its samples to those
+/// beside, above or below it; or more than slightly in such a neighbour. Given are the breaks of the row above, of its
+/// own and of the one below.
 #[inline(always)]
 fn join([above, own, below]: [&[u8]; 3], marks: &mut [u8]) {
-    const OWN: u8 = breaks::OWN | breaks::OWN << breaks::HARD;
+    const OWN: u8 = breaks::OWN << breaks::HARD;
     const LEFT: u8 = breaks::LEFT | breaks::LEFT << breaks::HARD;
     const UPPER: u8 = breaks::UPPER | breaks::UPPER << breaks::HARD;
     for (x, out) in marks.iter_mut().enumerate() {
@@ -214,8 +219,9 @@ fn find_breaks(
             let x = i * WORD + left.trailing_zeros() as usize;
             left &= left - 1;
             let [a, b, c, d] = own[x];
-            if !pairs.coarse.are_alike([a, b, c, d, own[x - 1][0], above[x][0]]) {
-                out[x + 1] = breaks_of(context, &own[x], [own[x - 1][0], above[x][0]], pairs);
+            let beside = [own[x - 1][OUTERMOST.right], above[x][OUTERMOST.bottom]];
+            if !pairs.coarse.are_alike([a, b, c, d, beside[0], beside[1]]) {
+                out[x + 1] = breaks_of(context, &own[x], beside, (pairs, OUTERMOST));
             }
         }
     }
@@ -224,13 +230,22 @@ fn find_breaks(
 /// The places where colours break off in a pixel, and on the way to it.
 #[inline(always)]
 fn breaks_at(context: &RasterContext<'_>, band: &SampleBand, [x, y]: [i32; 2], pairs: &mut Pairs<'_>) -> u8 {
-    let ids_of = |x: i32, y: i32| if band.has(x, y) { band.pixel(x, y).0 } else { &[NOTHING] };
-    breaks_of(context, ids_of(x, y), [ids_of(x - 1, y)[0], ids_of(x, y - 1)[0]], pairs)
+    const BEYOND: &[u32] = &[NOTHING; 16];
+    let outermost = OutermostSamples::of(band.samples);
+    let ids_of = |x: i32, y: i32| if band.has(x, y) { band.pixel(x, y).0 } else { BEYOND };
+    let beside = [ids_of(x - 1, y)[outermost.right], ids_of(x, y - 1)[outermost.bottom]];
+    breaks_of(context, ids_of(x, y), beside, (pairs, outermost))
 }
 
-/// The same, given the ids of the pixel's samples and those of the first sample of the pixel on the left and above.
+/// The same, given the ids of the pixel's samples and those of the outermost samples beside them, of the pixel on the left
+/// and the one above.
 #[inline(always)]
-fn breaks_of(context: &RasterContext<'_>, ids: &[u32], [left, upper]: [u32; 2], pairs: &mut Pairs<'_>) -> u8 {
+fn breaks_of(
+    context: &RasterContext<'_>,
+    ids: &[u32],
+    [left, upper]: [u32; 2],
+    (pairs, outermost): (&mut Pairs<'_>, OutermostSamples),
+) -> u8 {
     let others = (left ^ ids[0]) | (upper ^ ids[0]);
     if ids.iter().fold(others, |difference, id| difference | (id ^ ids[0])) == 0 {
         return 0;
@@ -242,8 +257,8 @@ fn breaks_of(context: &RasterContext<'_>, ids: &[u32], [left, upper]: [u32; 2], 
     for s in 1..ids.len() {
         found |= pairs.step(context, ids[s - 1], ids[s]).breaks(breaks::OWN);
     }
-    found |= pairs.step(context, left, ids[0]).breaks(breaks::LEFT);
-    found | pairs.step(context, upper, ids[0]).breaks(breaks::UPPER)
+    found |= pairs.step(context, left, ids[outermost.left]).breaks(breaks::LEFT);
+    found | pairs.step(context, upper, ids[outermost.top]).breaks(breaks::UPPER)
 }
 
 impl Step {

@@ -4,7 +4,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Ids, WORD};
+use super::{Ids, OUTERMOST, WORD};
 
 /// Pixels in a vector.
 const PIXELS: usize = 2;
@@ -16,8 +16,10 @@ const VECTORS: usize = 4;
 #[inline]
 #[target_feature(enable = "avx2")]
 pub fn word(own: &[Ids; WORD + 1], above: &[Ids; WORD]) -> u64 {
-    // A shuffle per vector puts the first sample of each pixel into all places.
+    // A shuffle per vector puts one sample of each pixel into all places.
     let first = |v: __m256i| _mm256_shuffle_epi32::<0>(v);
+    let rightmost = |v: __m256i| _mm256_shuffle_epi32::<{ 0x55 * OUTERMOST.right as i32 }>(v);
+    let lowest = |v: __m256i| _mm256_shuffle_epi32::<{ 0x55 * OUTERMOST.bottom as i32 }>(v);
     let mut word = 0;
     for group in 0..WORD / (PIXELS * VECTORS) {
         let mut are_same = [_mm256_setzero_si256(); VECTORS];
@@ -25,8 +27,8 @@ pub fn word(own: &[Ids; WORD + 1], above: &[Ids; WORD]) -> u64 {
             let x = PIXELS * (VECTORS * group + v);
             let ids = load(own, x + 1);
             let id = first(ids);
-            let others =
-                _mm256_or_si256(_mm256_xor_si256(id, first(load(own, x))), _mm256_xor_si256(id, first(load(above, x))));
+            let left = _mm256_xor_si256(id, rightmost(load(own, x)));
+            let others = _mm256_or_si256(left, _mm256_xor_si256(id, lowest(load(above, x))));
             let difference = _mm256_or_si256(_mm256_xor_si256(id, ids), others);
             *is_same = _mm256_cmpeq_epi32(difference, _mm256_setzero_si256());
         }

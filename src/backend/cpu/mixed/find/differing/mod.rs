@@ -1,10 +1,13 @@
-//! Stage mixed, per row: the pixels whose samples show several faces, or another face than the pixel on the left or
-//! above.
+//! Stage mixed, per row: the pixels whose samples show several faces, or another face than the nearest samples of the
+//! pixels on the left and above.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 
 use crate::backend::cpu::isa::Isa;
+use crate::plan::OutermostSamples;
+
+const OUTERMOST: OutermostSamples = OutermostSamples::OF_FOUR;
 
 /// Ids of a pixel's samples.
 pub type Ids = [u32; 4];
@@ -46,8 +49,8 @@ fn word(isa: Isa, own: &[Ids; WORD + 1], above: &[Ids]) -> u64 {
     let _ = isa;
     let mut word = 0;
     for (x, above) in above.iter().enumerate() {
-        let (left, [a, b, c, d]) = (own[x][0], own[x + 1]);
-        let difference = (a ^ b) | (a ^ c) | (a ^ d) | (a ^ left) | (a ^ above[0]);
+        let (left, [a, b, c, d]) = (own[x][OUTERMOST.right], own[x + 1]);
+        let difference = (a ^ b) | (a ^ c) | (a ^ d) | (a ^ left) | (a ^ above[OUTERMOST.bottom]);
         word |= u64::from(difference != 0) << x;
     }
     word
@@ -70,7 +73,7 @@ mod tests {
                 let (own, above) = (row(), row());
                 let differs = |x: usize| {
                     let first = own[x][0];
-                    own[x] != [first; 4] || above[x][0] != first || x > 0 && own[x - 1][0] != first
+                    own[x] != [first; 4] || above[x][3] != first || x > 0 && own[x - 1][1] != first
                 };
                 let want: Vec<bool> = (0..width).map(differs).collect();
                 for isa in Isa::available() {
