@@ -203,8 +203,8 @@ fn shows_interval(edge: vec4<u32>, s: Segment, interval: vec2<f32>, is_gap: bool
     return length > rn(s.inverse_length * batch.unseen_part) || !is_behind_samples(edge, s, interval);
 }
 
-// True if the samples of the pixel in the middle of an interval show faces nearer than it, but for
-// `farther_samples`, and none of them the edge's own.
+// True if no sample of the pixel in the middle of an interval shows one of the edge's own faces, and all but at most
+// `farther_samples` show faces nearer than it.
 fn is_behind_samples(edge: vec4<u32>, s: Segment, interval: vec2<f32>) -> bool {
     let pixel = vec2<i32>(floor(point_at(s, rn((interval.x + interval.y) * 0.5))));
     if !has_samples(pixel) {

@@ -232,7 +232,7 @@ impl OutermostSamples {
     /// Those of 16 samples.
     pub const OF_SIXTEEN: Self = Self { left: 12, right: 13, top: 15, bottom: 14 };
 
-    /// Those of 4 samples or of 16.
+    /// Those of 4 samples or of 16. Adaptive plans have no other numbers.
     pub fn of(samples: u32) -> Self {
         if samples == 4 { Self::OF_FOUR } else { Self::OF_SIXTEEN }
     }

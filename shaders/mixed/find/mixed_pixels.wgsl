@@ -5,8 +5,8 @@
 // Peeled layers per sample.
 @group(1) @binding(27) var<storage, read> peel_state: array<PeelState>;
 
-// Places where colours break off that concern all pixels beside the one that has them, and also the one on its left,
-// and the one above it. In the pixel itself more than slightly, on the way to it slightly or more.
+// Bits of a neighbour that make a pixel mixed. Of every neighbour: breaks among its own samples that are more than
+// slight. Of the one on the right, also breaks across the side between both pixels; likewise of the one below.
 const OWN_PLACES: u32 = 0x10u;
 const LEFT_PLACES: u32 = 0x32u;
 const UPPER_PLACES: u32 = 0x54u;

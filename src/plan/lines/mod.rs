@@ -89,13 +89,13 @@ impl LinePass {
 
     /// Length of a visible part beside a hidden one, pixels, up to which a face without a sample may hide it. At
     /// most 1 px: an edge is looked at only that far beyond what its line reaches. 0 where all edges are drawn: the
-    /// lines along the face's own edges cover what it hides.
+    /// lines along the edges of the thin face lie over the part that it hides.
     pub fn unseen_part_px(&self, samples: u32) -> f32 {
         if self.is_complete { 0.0 } else { Self::unseen_width_px(samples).min(1.0) }
     }
 
     /// Number of a pixel's samples that may show something farther than such a part, while it is still taken for
-    /// hidden. Beyond a contour lies what is farther than its face.
+    /// hidden. A contour often disappears close to the border of what hides it; there a sample may see past that border.
     pub fn farther_samples_max(&self, samples: u32) -> u32 {
         if self.contour { samples / 4 } else { 0 }
     }

@@ -76,11 +76,14 @@ impl ErrorTable {
     /// Errors of filled pictures are at edges. Their number grows with the picture's side and its
     /// area with the square of the side, so the mean square goes with 1 / side. Lines of one mesh
     /// meet in a larger share of the pixels as these get fewer, with about the same effect.
+    /// A contour errs most where faces without a sample hide it. The smaller the picture, the more
+    /// such faces there are, beside fewer pixels of line: its mean square goes with 1 / side^2.
     /// Pictures larger than the measured ones get no smaller error, since finer meshes go with
     /// them.
     pub fn error(&self, row: &Row, pixels: f64) -> f64 {
         let smaller = (self.size_px / pixels.sqrt()).max(1.0);
-        (row.error * smaller.sqrt()).min(255.0)
+        let growth = if row.technique == "contour" { smaller } else { smaller.sqrt() };
+        (row.error * growth).min(255.0)
     }
 
     /// True if a GPU was measured that is not software.

@@ -210,8 +210,8 @@ impl Parts<'_> {
         length > px * least_px && (length > unseen || !self.are_behind_samples([start, end]))
     }
 
-    /// True if the samples of the pixel in the middle of an interval show faces nearer than it, but for
-    /// [`LinePass::farther_samples_max`], and none of them the edge's own.
+    /// True if no sample of the pixel in the middle of an interval shows one of the edge's own faces, and all but at
+    /// most [`LinePass::farther_samples_max`] show faces nearer than it.
     fn are_behind_samples(&self, [start, end]: [f32; 2]) -> bool {
         let [x, y] = self.segment.point((start + end) * 0.5).map(|v| v.floor() as i32);
         if !self.band.has(x, y) {
@@ -220,7 +220,7 @@ impl Parts<'_> {
         let nearest = self.segment.depth(start).max(self.segment.depth(end)) * NEARER_RATIO;
         let (ids, depths) = self.band.pixel(x, y);
         let farther = depths.iter().filter(|depth| **depth <= nearest).count() as u32;
-        farther <= self.lines.farther_samples_max(ids.len() as u32)
+        farther <= self.lines.farther_samples_max(self.context.plan.samples)
             && !ids.iter().any(|id| self.edge.faces.contains(id) & (*id != NOTHING))
     }
 }

@@ -25,7 +25,7 @@ const CASES: [(Shown, bool); 4] =
 
 /// Columns of a wall per row of the picture, in steps of 1/64: then all corners of a strip's faces lie on the line
 /// through the first and the last, and there are no cracks beside it.
-const SLOPES: [i16; 5] = [-61, -20, 0, 11, 36];
+const SLOPES: [i16; 5] = [-61, -20, 0, 11, 52];
 
 /// Between two parts of a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -232,7 +232,7 @@ fn contours_leave_fewer_dots_where_samples_see_beyond_a_border() {
         let [ink_px2, of_contours] = [false, true].map(|is_contour| ends_behind_a_border(case, is_contour));
         assert!(ink_px2 > 15.0, "{case:?}: {ink_px2}");
         // A quarter of one sample is none.
-        let most = if case.0 == 1 { 1.0 } else { 0.8 };
-        assert!(of_contours <= most * ink_px2, "{case:?}: {of_contours} of {ink_px2}");
+        let share = if case.0 == 1 { 1.0..=1.0 } else { 0.5..=0.8 };
+        assert!(share.contains(&(of_contours / ink_px2)), "{case:?}: {of_contours} of {ink_px2}");
     }
 }

@@ -1,4 +1,4 @@
-//! Stage mixed, per row: the pixels whose samples show several faces, or another face than the nearest samples of the
+//! Stage mixed, per row: the pixels whose samples show several faces, or another face than the closest samples of the
 //! pixels on the left and above.
 
 #[cfg(target_arch = "x86_64")]
@@ -7,6 +7,7 @@ mod avx2;
 use crate::backend::cpu::isa::Isa;
 use crate::plan::OutermostSamples;
 
+/// The samples closest to the sides of a pixel of four.
 const OUTERMOST: OutermostSamples = OutermostSamples::OF_FOUR;
 
 /// Ids of a pixel's samples.
