@@ -3,8 +3,8 @@
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<u32>;
 
-// Numbers of the samples closest to a pixel's sides, of 4 samples and of 16: from the lowest nibble on the leftmost, the
-// rightmost, the topmost and the lowest.
+// Numbers of the samples closest to a pixel's sides, of 4 samples and of 16: from the lowest nibble on the leftmost,
+// the rightmost, the topmost and the lowest.
 const FOUR_OUTERMOST: u32 = 0x3012u;
 const SIXTEEN_OUTERMOST: u32 = 0xEFDCu;
 

@@ -95,7 +95,8 @@ impl LinePass {
     }
 
     /// Number of a pixel's samples that may show something farther than such a part, while it is still taken for
-    /// hidden. A contour often disappears close to the border of what hides it; there a sample may see past that border.
+    /// hidden. A contour often disappears close to the border of what hides it; there a sample may see past that
+    /// border.
     pub fn farther_samples_max(&self, samples: u32) -> u32 {
         if self.contour { samples / 4 } else { 0 }
     }

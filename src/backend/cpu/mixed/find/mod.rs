@@ -1,10 +1,10 @@
 //! Stage mixed, per pixel: finds the mixed pixels.
 //!
 //! A pixel is mixed if its samples show several faces (or a face and nothing) and colours break off from one to the
-//! next ([`Pairs::step`]), or between the two samples closest to one of its sides, one in each pixel. Where an edge cuts off a corner of
-//! a pixel without parting its samples, it parts those of a neighbour: a pixel is mixed, too, if colours break off more
-//! than slightly in one of its four neighbours. Pixels that a thin triangle touches are mixed even if no sample sees it
-//! ([`thin`]).
+//! next ([`Pairs::step`]), or between the two samples closest to one of its sides, one in each pixel. Where an edge cuts
+//! off a corner of a pixel without parting its samples, it parts those of a neighbour: a pixel is mixed, too, if colours
+//! break off more than slightly in one of its four neighbours. Pixels that a thin triangle touches are mixed even if no
+//! sample sees it ([`thin`]).
 //! Pixels in which a layer is seen are not mixed: layers are composited sample by sample.
 //!
 //! Most pixels are passed over quickly: all their samples show one face ([`differing`]), or faces that look alike
@@ -238,8 +238,8 @@ fn breaks_at(context: &RasterContext<'_>, band: &SampleBand, [x, y]: [i32; 2], p
     breaks_of(context, ids_of(x, y), beside, (pairs, outermost))
 }
 
-/// The same, given the ids of the pixel's samples, of the rightmost sample of the pixel on the left, and of the lowest one
-/// of the pixel above.
+/// The same, given the ids of the pixel's samples, of the rightmost sample of the pixel on the left, and of the
+/// lowest one of the pixel above.
 #[inline(always)]
 fn breaks_of(
     context: &RasterContext<'_>,
