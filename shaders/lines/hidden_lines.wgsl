@@ -211,15 +211,15 @@ fn is_behind_samples(edge: vec4<u32>, s: Segment, interval: vec2<f32>) -> bool {
         return false;
     }
     let nearest = rn(max(depth_of(s, interval.x), depth_of(s, interval.y)) * NEARER_RATIO);
-    var farther = 0u;
+    var nearer = 0u;
     for (var i = 0u; i < u32(sample_count()); i++) {
         let seen = seen_at(pixel, i);
-        farther += u32(bitcast<f32>(seen.y) <= nearest);
+        nearer += u32(bitcast<f32>(seen.y) > nearest);
         if seen.x != NOTHING && (seen.x == edge.z || seen.x == edge.w) {
             return false;
         }
     }
-    return farther <= batch.farther_samples;
+    return nearer + batch.farther_samples >= u32(sample_count());
 }
 
 // A run from `begin` with one more hidden interval.

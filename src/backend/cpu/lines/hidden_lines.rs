@@ -219,8 +219,9 @@ impl Parts<'_> {
         }
         let nearest = self.segment.depth(start).max(self.segment.depth(end)) * NEARER_RATIO;
         let (ids, depths) = self.band.pixel(x, y);
-        let farther = depths.iter().filter(|depth| **depth <= nearest).count() as u32;
-        farther <= self.lines.farther_samples_max(self.context.plan.samples)
+        let nearer = depths.iter().filter(|depth| **depth > nearest).count() as u32;
+        let samples = self.context.plan.samples;
+        nearer + self.lines.farther_samples_max(samples) >= samples
             && !ids.iter().any(|id| self.edge.faces.contains(id) & (*id != NOTHING))
     }
 }

@@ -134,8 +134,8 @@ fn rounds(cases: &[Case<'_>], baseline: &Case<'_>, runs: usize, back_ends: &mut 
                 draw(back_end, &baseline.plan);
             }
             for i in (first..cases.len()).chain(0..first) {
-                let on = &mut drawn[i];
-                on[back_end].times_ms.push(draw(back_end, &cases[i].plan).1);
+                let of_case = &mut drawn[i];
+                of_case[back_end].times_ms.push(draw(back_end, &cases[i].plan).1);
             }
         }
     }

@@ -20,7 +20,7 @@ pub mod thin;
 pub use self::pixels::MixedPixels;
 
 use self::coarse::CoarseLooks;
-use self::differing::{WORD, find_differing};
+use self::differing::{OUTERMOST, WORD, find_differing};
 use self::look::Step;
 use self::pairs::Pairs;
 use self::thin::{mark_thin, may_mark};
@@ -45,9 +45,6 @@ pub mod breaks {
     /// From the bits above to those of the same places where colours break off more than slightly.
     pub const HARD: u32 = 4;
 }
-
-/// The samples closest to the sides of a pixel of four.
-const OUTERMOST: OutermostSamples = OutermostSamples::OF_FOUR;
 
 /// Values of a row's pixels, and of one more on each side.
 #[derive(Default)]

@@ -8,7 +8,7 @@ use crate::backend::cpu::isa::Isa;
 use crate::plan::OutermostSamples;
 
 /// The samples closest to the sides of a pixel of four.
-const OUTERMOST: OutermostSamples = OutermostSamples::OF_FOUR;
+pub const OUTERMOST: OutermostSamples = OutermostSamples::OF_FOUR;
 
 /// Ids of a pixel's samples.
 pub type Ids = [u32; 4];
