@@ -75,6 +75,7 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
     let is_tinting = of_layers && peeling.is_some_and(|pass| !pass.wires_only);
     for pass in &mut lines {
         pass.is_complete &= is_one_surface;
+        pass.keeps_short_parts &= is_one_surface;
         pass.is_tinted &= is_tinting;
     }
     let is_unclipped = cx.skips.skip(

@@ -234,6 +234,7 @@ impl OutermostSamples {
 
     /// Those of 4 samples or of 16. Adaptive plans have no other numbers.
     pub fn of(samples: u32) -> Self {
+        debug_assert!(matches!(samples, 4 | 16), "{samples} samples");
         if samples == 4 { Self::OF_FOUR } else { Self::OF_SIXTEEN }
     }
 }

@@ -20,8 +20,12 @@ pub struct LinePass {
     /// for all but the first of more than two faces; in a contour those beside the widest gap are
     /// kept. Passes may share a list.
     pub edges: Arc<Vec<Edge>>,
-    /// True if these are all edges of all triangles of the plan, and these are all opaque.
+    /// True if these are all edges of all triangles of the plan, and these are all opaque: then holes in faces
+    /// may tell the lines' coverage.
     pub is_complete: bool,
+    /// True if short parts are drawn beside hidden ones even where a face without a sample may hide them. So it is
+    /// where all edges are drawn: the lines along the edges of the thin face lie over the part that it hides.
+    pub keeps_short_parts: bool,
     /// Full width, pixels.
     pub width_px: f32,
     /// Width of the soft ramp, both sides together, pixels.
@@ -48,6 +52,23 @@ impl LinePass {
     /// Largest number that areas around a line's end are scaled to. They fit 16 bits, and so does
     /// the difference of two.
     pub const SCALED_MAX: f32 = 16_000.0;
+
+    /// Opaque white lines of a width without ramps along some edges, of which no surface hides a part.
+    pub fn new(edges: Arc<Vec<Edge>>, width_px: f32) -> LinePass {
+        LinePass {
+            edges,
+            is_complete: false,
+            keeps_short_parts: false,
+            width_px,
+            smoothing_px: 0.0,
+            color: [1.0; 4],
+            shown: Shown::All,
+            unseen_side: None,
+            contour: false,
+            lit: false,
+            is_tinted: false,
+        }
+    }
 
     /// Distance from the middle of a line to the farthest pixel centre that it touches, pixels:
     /// half its width, half its ramp, and half a pixel's diagonal.
@@ -88,10 +109,9 @@ impl LinePass {
     }
 
     /// Length of a visible part beside a hidden one, pixels, up to which a face without a sample may hide it. At
-    /// most 1 px: an edge is looked at only that far beyond what its line reaches. 0 where all edges are drawn: the
-    /// lines along the edges of the thin face lie over the part that it hides.
+    /// most 1 px: an edge is looked at only that far beyond what its line reaches. 0 where short parts are kept.
     pub fn unseen_part_px(&self, samples: u32) -> f32 {
-        if self.is_complete { 0.0 } else { Self::unseen_width_px(samples).min(1.0) }
+        if self.keeps_short_parts { 0.0 } else { Self::unseen_width_px(samples).min(1.0) }
     }
 
     /// Number of a pixel's samples that may show something farther than such a part, while it is still taken for

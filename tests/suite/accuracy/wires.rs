@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use meshsnap::backend::Renderer;
-use meshsnap::plan::{DrawPlan, Edge, LinePass, Shown};
+use meshsnap::plan::{DrawPlan, Edge, LinePass};
 
 use crate::oracle::lines::{capsule, strip};
 use crate::oracle::surface::visible::Segment;
@@ -30,18 +30,7 @@ const WIDTHS_PX: [f32; 9] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 8.0, 16.0];
 /// A line pass of opaque white on nothing, so that alpha is coverage.
 pub fn line_plan<'a>(positions: &'a [[f32; 3]], edges: &[[u32; 2]], width_px: f32) -> DrawPlan<'a> {
     let edges = edges.iter().map(|&vertices| Edge { vertices, faces: [Edge::NO_FACE; 2] });
-    let pass = LinePass {
-        edges: Arc::new(edges.collect()),
-        is_complete: false,
-        width_px,
-        smoothing_px: 0.0,
-        color: [1.0; 4],
-        shown: Shown::All,
-        unseen_side: None,
-        contour: false,
-        lit: false,
-        is_tinted: false,
-    };
+    let pass = LinePass::new(Arc::new(edges.collect()), width_px);
     let plan = scenes::screen_plan([SIZE_PX; 2], 4, 1.0, positions, &[]);
     DrawPlan { surface: None, lines: vec![pass], background: [0.0; 4], ..plan }
 }

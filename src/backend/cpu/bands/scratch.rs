@@ -297,19 +297,7 @@ mod tests {
             screen_up: axis,
             screen_right: axis,
         };
-        let (edges, shown) = (Arc::default(), Shown::All);
-        let pass = LinePass {
-            edges,
-            is_complete: false,
-            width_px: 1.0,
-            smoothing_px: 0.0,
-            color: zero,
-            shown,
-            unseen_side: None,
-            contour: false,
-            lit: false,
-            is_tinted: false,
-        };
+        let pass = LinePass::new(Arc::default(), 1.0);
         let plan = DrawPlan::new(size_px, &[], &[], projection);
         DrawPlan { samples: 4, lines: vec![pass; passes], ..plan }
     }

@@ -36,18 +36,7 @@ pub const LARGEST: Case =
 
 /// Some lines of a width, lit.
 pub fn lines(edges: Arc<Vec<Edge>>, width_px: f32, shown: Shown) -> LinePass {
-    LinePass {
-        edges,
-        is_complete: false,
-        width_px,
-        smoothing_px: 1.0,
-        color: [1.0; 4],
-        shown,
-        unseen_side: None,
-        contour: false,
-        lit: true,
-        is_tinted: true,
-    }
+    LinePass { smoothing_px: 1.0, shown, lit: true, is_tinted: true, ..LinePass::new(edges, width_px) }
 }
 
 /// A list of edges that do not matter.

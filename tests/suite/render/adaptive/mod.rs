@@ -3,6 +3,7 @@
 
 mod layers;
 mod quarters;
+mod steps;
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::{CpuRenderer, Isa};

@@ -19,9 +19,26 @@ const SIZE_PX: [u32; 2] = [120, 96];
 /// Samples per pixel, and a width that a face without a sample may have.
 const WIDTHS: [(u32, f32); 4] = [(1, 0.8), (4, 0.5), (8, 0.36), (16, 0.3)];
 
-/// Lines drawn, and whether they are in pieces.
-const CASES: [(Shown, bool); 4] =
-    [(Shown::Visible, false), (Shown::Visible, true), (Shown::Hidden, false), (Shown::Hidden, true)];
+/// Lines behind a wall.
+#[derive(Clone, Copy, Debug)]
+struct Lines {
+    shown: Shown,
+    /// True if they end within each strip.
+    in_pieces: bool,
+    contour: bool,
+    keeps_short_parts: bool,
+}
+
+const VISIBLE: Lines = Lines { shown: Shown::Visible, in_pieces: false, contour: false, keeps_short_parts: false };
+
+/// Lines whose short parts may be dropped.
+const CASES: [Lines; 5] = [
+    VISIBLE,
+    Lines { in_pieces: true, ..VISIBLE },
+    Lines { contour: true, ..VISIBLE },
+    Lines { shown: Shown::Hidden, ..VISIBLE },
+    Lines { shown: Shown::Hidden, in_pieces: true, ..VISIBLE },
+];
 
 /// Columns of a wall per row of the picture, in steps of 1/64: then all corners of a strip's faces lie on the line
 /// through the first and the last, and there are no cracks beside it.
@@ -78,20 +95,11 @@ fn wall(slope: i16, width_px: f32, strip: Between) -> (Vec<[f32; 3]>, Vec<[u32; 
     (positions, triangles)
 }
 
-/// A pass of lines behind a wall.
-fn pass(edges: Vec<Edge>, shown: Shown) -> LinePass {
-    LinePass {
-        edges: Arc::new(edges),
-        is_complete: false,
-        width_px: 1.5,
-        smoothing_px: 0.0,
-        color: [1.0, 0.0, 0.0, 1.0],
-        shown,
-        unseen_side: None,
-        contour: false,
-        lit: false,
-        is_tinted: false,
-    }
+/// A pass of red lines.
+fn pass(edges: Vec<Edge>, lines: Lines) -> LinePass {
+    let Lines { shown, contour, keeps_short_parts, .. } = lines;
+    let color = [1.0, 0.0, 0.0, 1.0];
+    LinePass { color, shown, contour, keeps_short_parts, ..LinePass::new(Arc::new(edges), 1.5) }
 }
 
 fn draw(plan: &DrawPlan<'_>) -> Image {
@@ -110,7 +118,7 @@ fn draw_everywhere(plan: &DrawPlan<'_>, name: &str) -> Image {
 
 /// Lines behind a wall: of each, the ends of its pieces in order. These are the line's ends and, in pieces, the middles
 /// of strips.
-fn lines(slope: i16, width_px: f32, in_pieces: bool) -> Vec<Vec<[f32; 3]>> {
+fn ends_of_lines(slope: i16, width_px: f32, in_pieces: bool) -> Vec<Vec<[f32; 3]>> {
     let row = |k: i32, x: f32| k as f32 * 7.13 + (x + 70.0) / 140.0;
     let middle = |k: i32, at: f32| {
         let (column, slope) = (at + 5.0 + 0.5 * strip_columns(slope, width_px), f32::from(slope) / 64.0);
@@ -127,18 +135,18 @@ fn lines(slope: i16, width_px: f32, in_pieces: bool) -> Vec<Vec<[f32; 3]>> {
 }
 
 /// The sum of how red the pixels of a wall's picture are.
-fn ink(slope: i16, (samples, width_px): (u32, f32), strip: Between, shown: Shown, in_pieces: bool) -> f64 {
+fn ink(slope: i16, (samples, width_px): (u32, f32), strip: Between, lines: Lines) -> f64 {
     let (mut positions, triangles) = wall(slope, width_px, strip);
     let mut edges = Vec::new();
-    for line in lines(slope, width_px, in_pieces) {
+    for line in ends_of_lines(slope, width_px, lines.in_pieces) {
         let first = positions.len() as u32;
         let edge = |k: u32| Edge { vertices: [first + k, first + k + 1], faces: [0, Edge::NO_FACE] };
         edges.extend((0..line.len() as u32 - 1).map(edge));
         positions.extend(line);
     }
     let mut plan = scenes::screen_plan(SIZE_PX, samples, 1.0, &positions, &triangles);
-    plan.lines = vec![pass(edges, shown)];
-    let name = format!("slope {slope}, {samples} samples, {strip:?}, {shown:?}, pieces: {in_pieces}");
+    plan.lines = vec![pass(edges, lines)];
+    let name = format!("slope {slope}, {samples} samples, {strip:?}, {lines:?}");
     // A wall without gaps is only what others are measured against.
     red(&if strip == Between::Wall { draw(&plan) } else { draw_everywhere(&plan, &name) })
 }
@@ -153,22 +161,18 @@ fn a_face_without_a_sample_hides_lines() {
     let mut cases = 0;
     for slope in SLOPES {
         for case in WIDTHS {
-            for (shown, in_pieces) in CASES {
-                let ink_px2 = ink(slope, case, Between::SmallFaces, shown, in_pieces);
-                let want = ink(slope, case, Between::Wall, shown, in_pieces);
+            for lines in CASES {
+                let [ink_px2, want] = [Between::SmallFaces, Between::Wall].map(|strip| ink(slope, case, strip, lines));
                 // A gap across a steep strip is longer than the 1 px that is looked at. Hidden lines go through gaps.
                 let is_longer = case.0 == 1 && slope.abs() > 48;
                 let share = if is_longer {
                     0.4
-                } else if shown == Shown::Visible {
+                } else if lines.shown == Shown::Visible {
                     0.02
                 } else {
                     0.002
                 };
-                assert!(
-                    (ink_px2 - want).abs() < share * want,
-                    "{slope} {case:?} {shown:?} {in_pieces}: {ink_px2} of {want}"
-                );
+                assert!((ink_px2 - want).abs() < share * want, "{slope} {case:?} {lines:?}: {ink_px2} of {want}");
                 cases += 1;
             }
         }
@@ -181,26 +185,26 @@ fn a_slit_shows_lines() {
     let mut cases = 0;
     for slope in SLOPES {
         for (samples, width_px) in WIDTHS {
-            for in_pieces in [false, true] {
+            for lines in CASES.into_iter().filter(|lines| lines.shown == Shown::Visible) {
                 let of_slits = |samples| {
-                    let [slits, wall] = [Between::Nothing, Between::Wall]
-                        .map(|strip| ink(slope, (samples, width_px), strip, Shown::Visible, in_pieces));
+                    let [slits, wall] =
+                        [Between::Nothing, Between::Wall].map(|strip| ink(slope, (samples, width_px), strip, lines));
                     slits - wall
                 };
                 let (ink_px2, want) = (of_slits(samples), of_slits(16));
                 let least = if samples == 1 { 0.7 } else { 0.88 };
-                let name = format!("{slope}, {samples} samples, in pieces: {in_pieces}");
+                let name = format!("{slope}, {samples} samples, {lines:?}");
                 assert!(want > 100.0 && ink_px2 > least * want, "{name}: {ink_px2} of {want}");
                 cases += 1;
             }
         }
     }
-    assert_eq!(cases, 2 * SLOPES.len() * WIDTHS.len());
+    assert_eq!(cases, 3 * SLOPES.len() * WIDTHS.len());
 }
 
 /// Ink of lines behind parts of a wall, beyond which nothing is. Each ends within a strip of small faces at the
 /// wall's border, and each elsewhere in its pixel.
-fn ends_behind_a_border((samples, width_px): (u32, f32), is_contour: bool) -> f64 {
+fn ends_behind_a_border((samples, width_px): (u32, f32), lines: Lines) -> f64 {
     const ENDS: u32 = 16;
     const ROWS: u32 = 16;
     let (mut positions, mut triangles, mut edges) = (Vec::new(), Vec::new(), Vec::new());
@@ -222,17 +226,31 @@ fn ends_behind_a_border((samples, width_px): (u32, f32), is_contour: bool) -> f6
     }
     let mut plan = scenes::screen_plan(SIZE_PX, samples, 1.0, &positions, &triangles);
     let without = red(&draw(&plan));
-    plan.lines = vec![LinePass { contour: is_contour, ..pass(edges, Shown::Visible) }];
-    red(&draw_everywhere(&plan, &format!("{samples} samples, contour: {is_contour}"))) - without
+    plan.lines = vec![pass(edges, lines)];
+    red(&draw_everywhere(&plan, &format!("{samples} samples, {lines:?}"))) - without
 }
 
 #[test]
 fn contours_leave_fewer_dots_where_samples_see_beyond_a_border() {
     for case in WIDTHS {
-        let [ink_px2, of_contours] = [false, true].map(|is_contour| ends_behind_a_border(case, is_contour));
+        let [ink_px2, of_contours] =
+            [false, true].map(|contour| ends_behind_a_border(case, Lines { contour, ..VISIBLE }));
         assert!(ink_px2 > 15.0, "{case:?}: {ink_px2}");
         // A quarter of one sample is none.
         let share = if case.0 == 1 { 1.0..=1.0 } else { 0.5..=0.8 };
         assert!(share.contains(&(of_contours / ink_px2)), "{case:?}: {of_contours} of {ink_px2}");
+    }
+}
+
+#[test]
+fn kept_short_parts_are_drawn_beside_what_no_sample_sees() {
+    for (case, slope) in WIDTHS.into_iter().zip(SLOPES) {
+        let [dropped, kept] = [false, true].map(|keeps_short_parts| {
+            let lines = Lines { keeps_short_parts, ..VISIBLE };
+            [ink(slope, case, Between::SmallFaces, lines), ends_behind_a_border(case, lines)]
+        });
+        // A line goes on into a gap, and a dot is left at a border.
+        let [into_gaps, at_borders] = [0, 1].map(|k| kept[k] / dropped[k]);
+        assert!(into_gaps > 1.03 && at_borders > 1.2, "{case:?}: {kept:?} and {dropped:?}");
     }
 }

@@ -134,19 +134,8 @@ fn lines_of<'a>(
 ) -> DrawPlan<'a> {
     let mut plan = scenes::screen_plan([64, 48], 4, 1.0, positions, triangles);
     plan.projection.clip = clip;
-    let edges = edges.into_iter().map(|vertices| Edge { vertices, faces: [0, Edge::NO_FACE] }).collect();
-    let pass = LinePass {
-        edges: Arc::new(edges),
-        is_complete: false,
-        width_px: 1.5,
-        smoothing_px: 0.0,
-        color: [1.0, 0.0, 0.0, 1.0],
-        shown: Shown::Visible,
-        unseen_side: None,
-        contour: false,
-        lit: false,
-        is_tinted: false,
-    };
+    let edges: Vec<_> = edges.into_iter().map(|vertices| Edge { vertices, faces: [0, Edge::NO_FACE] }).collect();
+    let pass = LinePass { color: [1.0, 0.0, 0.0, 1.0], ..LinePass::new(Arc::new(edges), 1.5) };
     let passes = [Shown::Visible, Shown::Hidden, Shown::All].map(|shown| LinePass { shown, ..pass.clone() });
     plan.lines = passes.to_vec();
     plan

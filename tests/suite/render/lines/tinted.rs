@@ -62,16 +62,10 @@ fn plan<'a>(positions: &'a [[f32; 3]], triangles: &'a [[u32; 3]], samples: u32) 
         faces: [Edge::NO_FACE; 2],
     };
     let pass = LinePass {
-        edges: Arc::new((0..=PANES).map(edge).collect()),
-        is_complete: false,
-        width_px: 6.0,
-        smoothing_px: 0.0,
         color: LINE,
         shown: Shown::Visible,
-        unseen_side: None,
-        contour: false,
-        lit: false,
         is_tinted: true,
+        ..LinePass::new(Arc::new((0..=PANES).map(edge).collect()), 6.0)
     };
     let look = |k: usize| {
         let [r, g, b, alpha] = pane(k);

@@ -1,0 +1,82 @@
+//! The pixels that an edge between two faces makes mixed: by how much the faces' normals differ, and by where the edge
+//! lies between the samples.
+
+use meshsnap::backend::Renderer;
+use meshsnap::backend::cpu::CpuRenderer;
+use meshsnap::backend::gpu::GpuRenderer;
+use meshsnap::limits::Deadline;
+use meshsnap::plan::{DrawPlan, ShadedMaterial, flags};
+
+use crate::support::gpus::gpus;
+use crate::support::scenes;
+
+const SIZE_PX: [u32; 2] = [37, 24];
+
+/// Angles between normals, degrees: alike, slightly different, different.
+const ANGLES_DEG: [f64; 3] = [10.0, 30.0, 70.0];
+
+/// A place of the edge beyond a pixel's left or upper border, 1/256 px; and the lines of pixels that are mixed for
+/// each of the angles, for 4 samples and for 16.
+///
+/// The outermost of 4 samples lie 32/256 px from the pixel's borders, those of 16 samples 8/256 px.
+const PLACES: [(f32, [[u64; 3]; 2]); 4] = [
+    // Between samples of one pixel: its neighbours are mixed, too, if the step is not slight.
+    (129.0, [[0, 1, 3], [0, 1, 3]]),
+    // Between the outermost samples of two pixels.
+    (4.0, [[0, 2, 2], [0, 2, 2]]),
+    (252.0, [[0, 2, 2], [0, 2, 2]]),
+    // Of 4 samples between the outermost of two pixels, of 16 between those of one pixel.
+    (20.0, [[0, 2, 2], [0, 1, 3]]),
+];
+
+/// Two squares that meet at an edge: upright or level, so far right of the picture's middle or below it.
+fn squares(is_upright: bool, edge_px: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    let corners = [[-90.0, -90.0], [edge_px, -90.0], [90.0, -90.0], [-90.0, 90.0], [edge_px, 90.0], [90.0, 90.0]];
+    let position = |[along, across]: [f32; 2]| if is_upright { [along, across, 0.5] } else { [across, along, 0.5] };
+    (corners.map(position).to_vec(), vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]])
+}
+
+/// A lit plan of two squares whose normals differ by an angle.
+fn plan<'a>(samples: u32, angle_deg: f64, positions: &'a [[f32; 3]], triangles: &'a [[u32; 3]]) -> DrawPlan<'a> {
+    let mut plan = scenes::screen_plan(SIZE_PX, samples, 1.0, positions, triangles);
+    (plan.is_adaptive, plan.margin_px) = (true, 1);
+    if let Some(surface) = &mut plan.surface {
+        let look = ShadedMaterial::unlit([1.0; 4]);
+        surface.materials = vec![ShadedMaterial { flags: look.flags | flags::FACE_NORMALS, ..look }];
+        let [a, b] = [-0.5, 0.5].map(|side| {
+            let (sin, cos) = (side * angle_deg).to_radians().sin_cos();
+            [sin as f32, 0.0, cos as f32]
+        });
+        surface.face_normals = vec![a, a, b, b].into();
+    }
+    plan
+}
+
+#[test]
+fn an_edge_mixes_the_pixels_whose_samples_it_parts() {
+    let mut renderers: Vec<Box<dyn Renderer>> = vec![Box::new(CpuRenderer::new(1)), Box::new(CpuRenderer::plain(1))];
+    renderers
+        .extend(gpus().into_iter().flatten().map(|gpu| Box::new(GpuRenderer::new(gpu.clone())) as Box<dyn Renderer>));
+    let mut cases = 0;
+    for (place, of_samples) in PLACES {
+        for is_upright in [true, false] {
+            // An edge in the first pixel right of the middle, or below it.
+            let half_px = if is_upright { SIZE_PX[0] } else { SIZE_PX[1] } as f32 / 2.0;
+            let (positions, triangles) = squares(is_upright, half_px.ceil() - half_px + place / 256.0);
+            let length_px = u64::from(if is_upright { SIZE_PX[1] } else { SIZE_PX[0] });
+            for (samples, lines) in [4, 16].into_iter().zip(of_samples) {
+                for (angle_deg, lines) in ANGLES_DEG.into_iter().zip(lines) {
+                    let plan = plan(samples, angle_deg, &positions, &triangles);
+                    for renderer in &mut renderers {
+                        renderer.draw(&plan, &Deadline::default()).unwrap();
+                        let mixed = renderer.draw_times().mixed_pixels;
+                        let name = format!("at {place}, upright: {is_upright}, {samples} samples, {angle_deg} degrees");
+                        assert_eq!(mixed, lines * length_px, "{name}, {:?}", renderer.kind());
+                        cases += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert_eq!(cases, PLACES.len() * 2 * 2 * ANGLES_DEG.len() * renderers.len());
+}
