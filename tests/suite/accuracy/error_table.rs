@@ -40,7 +40,7 @@ fn the_shipped_table_is_what_was_measured() {
     assert!(stored == made, "{} differs; cargo bench --bench accuracy -- --table-only stores it anew", path.display());
 }
 
-/// A fit that leaves one of them out tells of a machine that was busy with something else.
+/// No technique draws triangles in no time, or a picture's pixels.
 #[test]
 fn the_shipped_table_has_times_of_pixels_and_of_triangles() {
     let stored = std::fs::read_to_string(root().join("src/plan/quality/error_table.json")).unwrap();
@@ -56,13 +56,17 @@ fn the_shipped_table_has_times_of_pixels_and_of_triangles() {
 #[test]
 fn times_are_fitted_by_pixels_and_triangles() {
     let exact = [[0.25, 1.0, 3.5], [0.25, 10.0, 8.0], [1.0, 4.0, 12.0]];
-    let [a, b] = condensed::fit(&exact);
+    let [a, b] = condensed::fit(&exact, 0.0);
     assert!((a - 10.0).abs() < 1e-9 && (b - 0.5).abs() < 1e-9 || (a - 10.0).abs() < 2.0, "{a} {b}");
     // Neither may be below zero.
-    let [a, b] = condensed::fit(&[[1.0, 1.0, 10.0], [1.0, 100.0, 5.0]]);
+    let [a, b] = condensed::fit(&[[1.0, 1.0, 10.0], [1.0, 100.0, 5.0]], 0.0);
     assert!(a > 0.0 && b == 0.0, "{a} {b}");
-    let [a, b] = condensed::fit(&[[1.0, 1.0, 1.0], [1.0, 100.0, 1000.0]]);
+    let [a, b] = condensed::fit(&[[1.0, 1.0, 1.0], [1.0, 100.0, 1000.0]], 0.0);
     assert!(a == 0.0 && b > 0.0, "{a} {b}");
+    // Nor a triangle's time below the least.
+    let [a, b] = condensed::fit(&[[1.0, 1.0, 10.0], [1.0, 100.0, 5.0]], 0.01);
+    assert!(b == 0.01 && a > 4.0 && a < 10.0, "{a} {b}");
+    assert_eq!(condensed::fit(&exact, 0.4), condensed::fit(&exact, 0.0));
 }
 
 /// The program's own expectation of a technique with so many samples.

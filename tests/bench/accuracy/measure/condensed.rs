@@ -9,6 +9,10 @@ use serde_json::{Value, json};
 use super::BASELINE;
 use super::techniques::Family;
 
+/// What every technique draws at least: triangles of one colour each. So none takes less per triangle. The scenes alone do
+/// not tell: where a pixel takes long, how much of the picture each of them fills weighs more than its triangles.
+const PLAINEST: &str = "face";
+
 /// Kinds of back-ends, and which of the measured ones stand for them.
 const KINDS: [(&str, &str); 2] = [("cpu", "cpu-1"), ("gpu", "gpu")];
 
@@ -19,32 +23,25 @@ pub fn table(document: &Value) -> String {
     let choices = [Family::Wires, Family::Outlines, Family::Faces].map(Family::techniques).concat();
     let is_choice = |row: &&Value| choices.iter().any(|technique| row["technique"] == technique.name());
     let rows: Vec<&Value> = document["rows"].as_array().expect("rows").iter().filter(is_choice).collect();
-    let megapixels = document["size_px"].as_f64().expect("size_px").powi(2) / 1e6;
-    let kilotriangles = |scene: &Value| {
-        let scenes = document["scenes"].as_array().expect("scenes");
-        let scene = scenes.iter().find(|s| s["name"] == *scene).expect("a scene of every row");
-        scene["triangles"].as_f64().expect("triangles") / 1e3
-    };
     let mut made: Vec<String> = Vec::new();
     for (kind, back_end) in KINDS {
+        let rows: Vec<&Value> = rows.iter().copied().filter(|row| row["backend"] == back_end).collect();
+        let alike = |technique: &Value, samples: &Value| -> Vec<&Value> {
+            let is_alike = |r: &&Value| r["technique"] == *technique && r["samples"] == *samples;
+            rows.iter().copied().filter(is_alike).collect()
+        };
         let mut seen: Vec<(&Value, &Value)> = Vec::new();
-        for &row in rows.iter().filter(|row| row["backend"] == back_end) {
+        for &row in &rows {
             let key = (&row["technique"], &row["samples"]);
             if seen.contains(&key) {
                 continue;
             }
             seen.push(key);
-            let alike: Vec<&Value> = rows
-                .iter()
-                .copied()
-                .filter(|r| r["backend"] == back_end && (&r["technique"], &r["samples"]) == key)
-                .collect();
-            let error = alike.iter().map(|r| r["rmse"].as_f64().expect("rmse")).fold(0.0, f64::max);
-            let points: Vec<[f64; 3]> = alike
-                .iter()
-                .map(|r| [megapixels, kilotriangles(&r["scene"]), r["median_ms"].as_f64().expect("median_ms")])
-                .collect();
-            let [per_pixel, per_triangle] = fit(&points).map(|v| format!("{v:.3e}").parse::<f64>().expect("a number"));
+            let of_row = alike(key.0, key.1);
+            let error = of_row.iter().map(|r| r["rmse"].as_f64().expect("rmse")).fold(0.0, f64::max);
+            let [_, least] = fit(&points(document, &alike(&json!(PLAINEST), key.1)), 0.0);
+            let rounded = |v: f64| format!("{v:.3e}").parse::<f64>().expect("a number");
+            let [per_pixel, per_triangle] = fit(&points(document, &of_row), least).map(rounded);
             let row = json!({
                 "technique": key.0, "backend": kind, "samples": key.1, "error": error,
                 "ms_per_megapixel": per_pixel, "ms_per_kilotriangle": per_triangle,
@@ -71,21 +68,33 @@ fn about() -> String {
     format!(
         "Written by `cargo bench --bench accuracy -- --write`, or with --table-only from docs/accuracy.json. error: the largest RMSE \
          (/255) of the technique's scenes, since a promise must hold for the worst of them. Times: least squares of relative errors \
-         through the scenes' medians, on this machine, which other machines differ from; cpu is one thread. There are pictures of \
+         through the scenes' medians, a triangle no less than for plain faces, on this machine, which other machines differ from; cpu is one thread. There are pictures of \
          one size alone, so what a picture costs whatever it shows counts as its pixels'. The benchmark's baseline: {BASELINE}."
     )
 }
 
-/// The a, b >= 0 that make a p + b t nearest to ms, for points [p, t, ms], in squares of relative
+/// Megapixels, thousands of triangles and milliseconds of some rows.
+fn points(document: &Value, rows: &[&Value]) -> Vec<[f64; 3]> {
+    let scenes = document["scenes"].as_array().expect("scenes");
+    let megapixels = document["size_px"].as_f64().expect("size_px").powi(2) / 1e6;
+    let point = |row: &&Value| {
+        let scene = scenes.iter().find(|scene| scene["name"] == row["scene"]).expect("a scene of every row");
+        let triangles = scene["triangles"].as_f64().expect("triangles");
+        [megapixels, triangles / 1e3, row["median_ms"].as_f64().expect("median_ms")]
+    };
+    rows.iter().map(point).collect()
+}
+
+/// The a >= 0 and b >= least that make a p + b t nearest to ms, for points [p, t, ms], in squares of relative
 /// errors.
-pub fn fit(points: &[[f64; 3]]) -> [f64; 2] {
+pub fn fit(points: &[[f64; 3]], least: f64) -> [f64; 2] {
     let sum = |f: fn(f64, f64) -> f64| points.iter().map(|[p, t, ms]| f(p / ms, t / ms)).sum::<f64>();
     let (pp, pt, tt, p, t) = (sum(|p, _| p * p), sum(|p, t| p * t), sum(|_, t| t * t), sum(|p, _| p), sum(|_, t| t));
     let determinant = pp * tt - pt * pt;
     let [a, b] = [p * tt - t * pt, t * pp - p * pt].map(|v| v / determinant);
-    match (a > 0.0, b > 0.0) {
+    match (a > 0.0, b > least) {
         (true, true) => [a, b],
-        (false, true) => [0.0, t / tt],
-        _ => [p / pp, 0.0],
+        (false, true) => [0.0, (t / tt).max(least)],
+        _ => [((p - least * pt) / pp).max(0.0), least],
     }
 }
