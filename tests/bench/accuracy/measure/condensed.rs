@@ -1,4 +1,4 @@
-//! `src/plan/error_table.json`: what was measured, a row for each technique on each kind of
+//! `src/plan/quality/error_table.json`: what was measured, a row for each technique on each kind of
 //! back-end with each number of samples. The program chooses by it where a request asks for an
 //! error or a time.
 
@@ -9,8 +9,9 @@ use serde_json::{Value, json};
 use super::BASELINE;
 use super::techniques::Family;
 
-/// What every technique draws at least: triangles of one colour each. So none takes less per triangle. The scenes alone do
-/// not tell: where a pixel takes long, how much of the picture each of them fills weighs more than its triangles.
+/// The technique that draws triangles of one colour each. Every other one draws these triangles too, so none takes less
+/// time per triangle. A fit of its own scenes alone may say so where its pixels take long: then the part of the picture
+/// that a scene fills weighs more than its triangles.
 const PLAINEST: &str = "face";
 
 /// Kinds of back-ends, and which of the measured ones stand for them.
@@ -68,8 +69,8 @@ fn about() -> String {
     format!(
         "Written by `cargo bench --bench accuracy -- --write`, or with --table-only from docs/accuracy.json. error: the largest RMSE \
          (/255) of the technique's scenes, since a promise must hold for the worst of them. Times: least squares of relative errors \
-         through the scenes' medians, a triangle no less than for plain faces, on this machine, which other machines differ from; cpu is one thread. There are pictures of \
-         one size alone, so what a picture costs whatever it shows counts as its pixels'. The benchmark's baseline: {BASELINE}."
+         through the scenes' medians, a triangle no less than for plain faces, on this machine, which other machines differ from; cpu \
+         is one thread. There are pictures of one size alone, so what a picture costs whatever it shows counts as its pixels'. The benchmark's baseline: {BASELINE}."
     )
 }
 

@@ -15,8 +15,8 @@ const SIZE_PX: [u32; 2] = [37, 24];
 /// Angles between normals, degrees: alike, slightly different, different.
 const ANGLES_DEG: [f64; 3] = [10.0, 30.0, 70.0];
 
-/// A place of the edge beyond a pixel's left or upper border, 1/256 px; and the lines of pixels that are mixed for
-/// each of the angles, for 4 samples and for 16.
+/// Distance of the edge from a pixel's left or upper border, 1/256 px; and the number of columns or rows that are mixed:
+/// first with 4 samples, then with 16, for each of the angles.
 ///
 /// The outermost of 4 samples lie 32/256 px from the pixel's borders, those of 16 samples 8/256 px.
 const PLACES: [(f32, [[u64; 3]; 2]); 4] = [
@@ -29,7 +29,8 @@ const PLACES: [(f32, [[u64; 3]; 2]); 4] = [
     (20.0, [[0, 2, 2], [0, 1, 3]]),
 ];
 
-/// Two squares that meet at an edge: upright or level, so far right of the picture's middle or below it.
+/// Two squares that meet at an edge. It is upright and lies this far right of the picture's middle, or level and this
+/// far below it.
 fn squares(is_upright: bool, edge_px: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let corners = [[-90.0, -90.0], [edge_px, -90.0], [90.0, -90.0], [-90.0, 90.0], [edge_px, 90.0], [90.0, 90.0]];
     let position = |[along, across]: [f32; 2]| if is_upright { [along, across, 0.5] } else { [across, along, 0.5] };

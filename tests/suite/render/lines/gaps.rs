@@ -249,7 +249,7 @@ fn kept_short_parts_are_drawn_beside_what_no_sample_sees() {
             let lines = Lines { keeps_short_parts, ..VISIBLE };
             [ink(slope, case, Between::SmallFaces, lines), ends_behind_a_border(case, lines)]
         });
-        // A line goes on into a gap, and a dot is left at a border.
+        // Kept parts lie in gaps that no sample sees, and beyond a wall's border.
         let [into_gaps, at_borders] = [0, 1].map(|k| kept[k] / dropped[k]);
         assert!(into_gaps > 1.03 && at_borders > 1.2, "{case:?}: {kept:?} and {dropped:?}");
     }
