@@ -20,11 +20,11 @@ pub struct LinePass {
     /// for all but the first of more than two faces; in a contour those beside the widest gap are
     /// kept. Passes may share a list.
     pub edges: Arc<Vec<Edge>>,
-    /// True if these are all edges of all triangles of the plan, and these are all opaque: then holes in faces
-    /// may tell the lines' coverage.
+    /// True if these are all edges of all triangles of the plan, and all triangles are opaque. Then holes in faces may
+    /// tell the lines' coverage ([`DrawPlan::has_holes_under`]).
     pub is_complete: bool,
-    /// True if short parts are drawn beside hidden ones even where a face without a sample may hide them. So it is
-    /// where all edges are drawn: the lines along the edges of the thin face lie over the part that it hides.
+    /// True if a short visible part beside a hidden one is drawn even where a thin face that no sample sees may hide
+    /// it. True where all edges of an opaque mesh are drawn: the thin face's own lines cover the place.
     pub keeps_short_parts: bool,
     /// Full width, pixels.
     pub width_px: f32,
@@ -53,7 +53,8 @@ impl LinePass {
     /// the difference of two.
     pub const SCALED_MAX: f32 = 16_000.0;
 
-    /// Opaque white lines of a width without ramps along some edges, of which no surface hides a part.
+    /// Opaque white lines along some edges, all of one width. They have no ramps, no surface hides them, and they are
+    /// neither lit nor tinted.
     pub fn new(edges: Arc<Vec<Edge>>, width_px: f32) -> LinePass {
         LinePass {
             edges,

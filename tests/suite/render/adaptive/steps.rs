@@ -19,7 +19,7 @@ const ANGLES_DEG: [f64; 3] = [10.0, 30.0, 70.0];
 /// first with 4 samples, then with 16, for each of the angles.
 ///
 /// The outermost of 4 samples lie 32/256 px from the pixel's borders, those of 16 samples 8/256 px.
-const PLACES: [(f32, [[u64; 3]; 2]); 4] = [
+const PLACES: [(f32, [[u64; 3]; 2]); 7] = [
     // Between samples of one pixel: its neighbours are mixed, too, if the step is not slight.
     (129.0, [[0, 1, 3], [0, 1, 3]]),
     // Between the outermost samples of two pixels.
@@ -27,6 +27,10 @@ const PLACES: [(f32, [[u64; 3]; 2]); 4] = [
     (252.0, [[0, 2, 2], [0, 2, 2]]),
     // Of 4 samples between the outermost of two pixels, of 16 between those of one pixel.
     (20.0, [[0, 2, 2], [0, 1, 3]]),
+    (236.0, [[0, 2, 2], [0, 1, 3]]),
+    // Beside a sample of the outermost columns and rows.
+    (64.0, [[0, 1, 3], [0, 1, 3]]),
+    (192.0, [[0, 1, 3], [0, 1, 3]]),
 ];
 
 /// Two squares that meet at an edge. It is upright and lies this far right of the picture's middle, or level and this
@@ -37,7 +41,8 @@ fn squares(is_upright: bool, edge_px: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     (corners.map(position).to_vec(), vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]])
 }
 
-/// A lit plan of two squares whose normals differ by an angle.
+/// A plan of two squares that their normals alone tell apart: these differ by an angle. There are no lights, so the
+/// picture is not looked at.
 fn plan<'a>(samples: u32, angle_deg: f64, positions: &'a [[f32; 3]], triangles: &'a [[u32; 3]]) -> DrawPlan<'a> {
     let mut plan = scenes::screen_plan(SIZE_PX, samples, 1.0, positions, triangles);
     (plan.is_adaptive, plan.margin_px) = (true, 1);

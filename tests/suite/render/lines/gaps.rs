@@ -243,13 +243,13 @@ fn contours_leave_fewer_dots_where_samples_see_beyond_a_border() {
 }
 
 #[test]
-fn kept_short_parts_are_drawn_beside_what_no_sample_sees() {
+fn kept_short_parts_show_through_faces_without_a_sample() {
     for (case, slope) in WIDTHS.into_iter().zip(SLOPES) {
         let [dropped, kept] = [false, true].map(|keeps_short_parts| {
             let lines = Lines { keeps_short_parts, ..VISIBLE };
             [ink(slope, case, Between::SmallFaces, lines), ends_behind_a_border(case, lines)]
         });
-        // Kept parts lie in gaps that no sample sees, and beyond a wall's border.
+        // Lines show through strips whose faces no sample sees, and at ends that such faces hide beside a wall.
         let [into_gaps, at_borders] = [0, 1].map(|k| kept[k] / dropped[k]);
         assert!(into_gaps > 1.03 && at_borders > 1.2, "{case:?}: {kept:?} and {dropped:?}");
     }
