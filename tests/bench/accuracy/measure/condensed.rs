@@ -65,14 +65,14 @@ fn about() -> String {
         "Written by `cargo bench --bench accuracy -- --write`, or with --table-only from docs/accuracy.json. error: the largest RMSE \
          (/255) of the technique's scenes, since a promise must hold for the worst of them. Times: least squares of relative errors \
          through the scenes' medians, on this machine, which other machines differ from; cpu is one thread. A triangle takes at least \
-         the smallest time above 0 that was found for any technique with as many samples. There are pictures of \
+         the smallest time above 0 that was found for any technique on that kind of back-end with as many samples. There are pictures of \
          one size alone, so what a picture costs whatever it shows counts as its pixels'. The benchmark's baseline: {BASELINE}."
     )
 }
 
 /// The smallest time above 0 that a thousand triangles take with any technique of some rows, milliseconds.
 ///
-/// No technique draws triangles in no time. A fit may say so where pixels take long and scenes are few: these also differ
+/// No technique draws triangles in no time. A fit may say so where pixels take long and scenes are few: scenes also differ
 /// by how much of the picture they fill.
 fn least_of_triangles<'a>(document: &Value, rows: impl Iterator<Item = &'a Value> + Clone) -> f64 {
     let fitted = rows.clone().map(|row| {
