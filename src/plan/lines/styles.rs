@@ -100,8 +100,10 @@ impl LineStyle {
     /// The passes that draw these edges, those of hidden parts first.
     pub fn passes(&self, edges: &Arc<Vec<Edge>>, hides: bool, unseen_side: Option<Side>) -> Vec<LinePass> {
         let pass = |shown, color| LinePass {
+            edges: edges.clone(),
             is_complete: self.has_all_edges,
             keeps_short_parts: self.has_all_edges,
+            width_px: self.width_px,
             smoothing_px: self.smoothing_px,
             color,
             shown,
@@ -109,7 +111,6 @@ impl LineStyle {
             contour: self.contour,
             lit: self.lit,
             is_tinted: self.hidden != Hidden::Show && shown != Shown::Hidden,
-            ..LinePass::new(edges.clone(), self.width_px)
         };
         match self.hidden {
             Hidden::Show => vec![pass(Shown::All, self.color)],

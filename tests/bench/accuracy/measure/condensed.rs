@@ -35,9 +35,9 @@ pub fn table(document: &Value) -> String {
             seen.push(key);
             let of_row = alike(key.0, key.1);
             let error = of_row.iter().map(|r| r["rmse"].as_f64().expect("rmse")).fold(0.0, f64::max);
-            let b_min = least_of_triangles(document, rows.iter().copied().filter(|r| r["samples"] == *key.1));
+            let least = least_ms_per_kilotriangle(document, rows.iter().copied().filter(|r| r["samples"] == *key.1));
             let rounded = |v: f64| format!("{v:.3e}").parse::<f64>().expect("a number");
-            let [per_pixel, per_triangle] = fit(&points(document, &of_row), b_min).map(rounded);
+            let [per_pixel, per_triangle] = fit(&points(document, &of_row), least).map(rounded);
             let row = json!({
                 "technique": key.0, "backend": kind, "samples": key.1, "error": error,
                 "ms_per_megapixel": per_pixel, "ms_per_kilotriangle": per_triangle,
@@ -74,7 +74,7 @@ fn about() -> String {
 ///
 /// No technique draws triangles in no time. A fit may say so where pixels take long and scenes are few: scenes also differ
 /// by how much of the picture they fill.
-fn least_of_triangles<'a>(document: &Value, rows: impl Iterator<Item = &'a Value> + Clone) -> f64 {
+fn least_ms_per_kilotriangle<'a>(document: &Value, rows: impl Iterator<Item = &'a Value> + Clone) -> f64 {
     let fitted = rows.clone().map(|row| {
         let alike: Vec<&Value> = rows.clone().filter(|r| r["technique"] == row["technique"]).collect();
         fit(&points(document, &alike), 0.0)[1]

@@ -21,6 +21,13 @@ fn draw(renderer: &mut dyn Renderer, plan: &DrawPlan<'_>) -> Image {
     renderer.draw(plan, &Deadline::default()).unwrap()
 }
 
+/// The CPU's with shortcuts and without, and that of each GPU.
+fn every_renderer() -> Vec<Box<dyn Renderer>> {
+    let mut all: Vec<Box<dyn Renderer>> = vec![Box::new(CpuRenderer::new(1)), Box::new(CpuRenderer::plain(1))];
+    all.extend(gpus().into_iter().flatten().map(|gpu| Box::new(GpuRenderer::new(gpu.clone())) as Box<dyn Renderer>));
+    all
+}
+
 /// Each key once, with its last value.
 pub fn last_of_each<'a>(keys: &[(&'a str, &'a str)]) -> Vec<(&'a str, &'a str)> {
     let is_last = |i: usize| keys[i + 1..].iter().all(|other| other.0 != keys[i].0);
@@ -327,9 +334,7 @@ fn owns(corners: &Corners, p: [i64; 2]) -> bool {
 fn mixed_pixels_count_their_points() {
     const SIZE_PX: [u32; 2] = [48, 40];
     let mut random = Random(7);
-    let mut renderers: Vec<Box<dyn Renderer>> = vec![Box::new(CpuRenderer::new(1)), Box::new(CpuRenderer::plain(1))];
-    renderers
-        .extend(gpus().into_iter().flatten().map(|gpu| Box::new(GpuRenderer::new(gpu.clone())) as Box<dyn Renderer>));
+    let mut renderers = every_renderer();
     let renderers_count = renderers.len();
     let (mut partial, mut whole) = (0, 0);
     for size_px in [0.4, 3.0, 20.0, 400.0] {

@@ -1,13 +1,10 @@
 //! The pixels that an edge between two faces makes mixed: by how much the faces' normals differ, and by where the edge
 //! lies between the samples.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::limits::Deadline;
 use meshsnap::plan::{DrawPlan, ShadedMaterial, flags};
 
-use crate::support::gpus::gpus;
+use super::every_renderer;
 use crate::support::scenes;
 
 const SIZE_PX: [u32; 2] = [37, 24];
@@ -28,7 +25,7 @@ const PLACES: [(f32, [[u64; 3]; 2]); 7] = [
     // Of 4 samples between the outermost of two pixels, of 16 between those of one pixel.
     (20.0, [[0, 2, 2], [0, 1, 3]]),
     (236.0, [[0, 2, 2], [0, 1, 3]]),
-    // Beside a sample of the outermost columns and rows.
+    // Of 4 samples between the outermost and the next, of 16 between others of one pixel.
     (64.0, [[0, 1, 3], [0, 1, 3]]),
     (192.0, [[0, 1, 3], [0, 1, 3]]),
 ];
@@ -60,24 +57,24 @@ fn plan<'a>(samples: u32, angle_deg: f64, positions: &'a [[f32; 3]], triangles: 
 
 #[test]
 fn an_edge_mixes_the_pixels_whose_samples_it_parts() {
-    let mut renderers: Vec<Box<dyn Renderer>> = vec![Box::new(CpuRenderer::new(1)), Box::new(CpuRenderer::plain(1))];
-    renderers
-        .extend(gpus().into_iter().flatten().map(|gpu| Box::new(GpuRenderer::new(gpu.clone())) as Box<dyn Renderer>));
+    let mut renderers = every_renderer();
     let mut cases = 0;
-    for (place, of_samples) in PLACES {
+    for (place_256ths_px, of_samples) in PLACES {
         for is_upright in [true, false] {
             // An edge in the first pixel right of the middle, or below it.
             let half_px = if is_upright { SIZE_PX[0] } else { SIZE_PX[1] } as f32 / 2.0;
-            let (positions, triangles) = squares(is_upright, half_px.ceil() - half_px + place / 256.0);
+            let (positions, triangles) = squares(is_upright, half_px.ceil() - half_px + place_256ths_px / 256.0);
             let length_px = u64::from(if is_upright { SIZE_PX[1] } else { SIZE_PX[0] });
-            for (samples, lines) in [4, 16].into_iter().zip(of_samples) {
-                for (angle_deg, lines) in ANGLES_DEG.into_iter().zip(lines) {
+            for (samples, of_angles) in [4, 16].into_iter().zip(of_samples) {
+                for (angle_deg, mixed_rows) in ANGLES_DEG.into_iter().zip(of_angles) {
                     let plan = plan(samples, angle_deg, &positions, &triangles);
                     for renderer in &mut renderers {
                         renderer.draw(&plan, &Deadline::default()).unwrap();
                         let mixed = renderer.draw_times().mixed_pixels;
-                        let name = format!("at {place}, upright: {is_upright}, {samples} samples, {angle_deg} degrees");
-                        assert_eq!(mixed, lines * length_px, "{name}, {:?}", renderer.kind());
+                        let name = format!(
+                            "at {place_256ths_px}, upright: {is_upright}, {samples} samples, {angle_deg} degrees"
+                        );
+                        assert_eq!(mixed, mixed_rows * length_px, "{name}, {:?}", renderer.kind());
                         cases += 1;
                     }
                 }

@@ -244,6 +244,7 @@ fn contours_leave_fewer_dots_where_samples_see_beyond_a_border() {
 
 #[test]
 fn kept_short_parts_show_through_faces_without_a_sample() {
+    // Each width with another slope: that all slopes hide lines is tested above.
     for (case, slope) in WIDTHS.into_iter().zip(SLOPES) {
         let [dropped, kept] = [false, true].map(|keeps_short_parts| {
             let lines = Lines { keeps_short_parts, ..VISIBLE };

@@ -101,22 +101,25 @@ fn holes_and_strokes_tell_of_the_same_lines() {
 fn what_holes_cannot_tell_is_left_to_strokes() {
     let mesh = scenes::mesh(&shapes::sheet(8));
     let wire = ("style", "wire");
-    let cases: &[(&[(&str, &str)], bool)] = &[
-        (&[wire, ALL, ("wire.thickness", "1")], true),
-        (&[wire, ALL, ("wire.thickness", "0.79")], false),
-        (&[wire, ALL, ("wire.thickness", "8.1")], false),
-        (&[wire, ALL, ("samples", "1")], false),
-        (&[wire, ALL, ("samples", "16"), ("wire.thickness", "0.5")], true),
-        (&[wire, ALL, ("wire.smoothing", "0.5")], false),
-        (&[wire, ALL, ("wire.hidden", "show")], false),
-        (&[wire], false),
-        (&[wire, ALL, ("surface.opacity", "0.5")], false),
-        (&[wire, ALL, ("surface.cull", "back")], false),
-        (&[("style", "outline"), ("outline.method", "contour")], false),
-        (&[("style", "hidden-line"), ALL], true),
+    // Keys, and if holes may tell the lines, and if short parts of these are kept.
+    let cases: &[(Keys<'_>, bool, bool)] = &[
+        (&[wire, ALL, ("wire.thickness", "1")], true, true),
+        (&[wire, ALL, ("wire.thickness", "0.79")], false, true),
+        (&[wire, ALL, ("wire.thickness", "8.1")], false, true),
+        (&[wire, ALL, ("samples", "1")], false, true),
+        (&[wire, ALL, ("samples", "16"), ("wire.thickness", "0.5")], true, true),
+        (&[wire, ALL, ("wire.smoothing", "0.5")], false, true),
+        (&[wire, ALL, ("wire.hidden", "show")], false, true),
+        (&[wire], false, false),
+        (&[wire, ALL, ("surface.opacity", "0.5")], false, false),
+        (&[wire, ALL, ("surface.cull", "back")], false, true),
+        (&[("style", "outline"), ("outline.method", "contour")], false, false),
+        (&[("style", "hidden-line"), ALL], true, true),
     ];
-    for (keys, has_holes) in cases {
+    for (keys, has_holes, keeps_short_parts) in cases {
         let plan = scenes::plan(&mesh, &scenes::spec(keys));
         assert_eq!(plan.has_holes(), *has_holes, "{keys:?}");
+        assert!(plan.lines.iter().all(|pass| pass.keeps_short_parts == *keeps_short_parts), "{keys:?}");
+        assert!(!plan.lines.is_empty(), "{keys:?}");
     }
 }
