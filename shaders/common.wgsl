@@ -1,6 +1,6 @@
 // Every stage: the uniforms' types, shared constants, and arithmetic that gives the CPU's bits
 // (docs/rasterizer.md, "Rounded operations"). Prepended to each stage by
-// src/backend/gpu/pipelines/mod.rs.
+// src/render/backend/gpu/pipelines/mod.rs.
 
 struct Frame {
     x_row: vec4<f32>,
@@ -9,7 +9,7 @@ struct Frame {
     w_row: vec4<f32>,
     screen_up: vec4<f32>,
     screen_right: vec4<f32>,
-    // The last word is the slope of rays, see Projection::ray_slope in src/plan/projection.rs.
+    // The last word is the slope of rays, see Projection::ray_slope in src/render/plan/projection.rs.
     to_viewer: vec4<f32>,
     // Towards each lamp, and how strong it is.
     lamps: array<vec4<f32>, 3>,
@@ -40,7 +40,7 @@ struct Frame {
     normal_triangles_at: u32,
     uv_triangles_at: u32,
     color_triangles_at: u32,
-    // Occlusion: src/plan/surface/occlusion.rs explains it. To places, and how strong it is.
+    // Occlusion: src/render/plan/surface/occlusion.rs explains it. To places, and how strong it is.
     occlusion_depth: vec4<f32>,
     // Width of a pixel, then which places, and which depths, may be of one surface.
     occlusion_spread: vec4<f32>,
@@ -123,7 +123,7 @@ struct Batch {
     // Items of the lists of mixed pixels, and parts of their colours, that there is room for.
     list_capacity: u32,
     part_capacity: u32,
-    // The line pass's, see LinePass::tint_reach in src/plan/lines/mod.rs.
+    // The line pass's, see LinePass::tint_reach in src/render/plan/lines/mod.rs.
     tint_reach: f32,
     // The line pass's, see LinePass::unseen_part_px and LinePass::farther_samples_max there.
     unseen_part: f32,
@@ -190,7 +190,7 @@ const BEHIND_SURFACE: u32 = 0x1000000u;
 const WIRES_ONLY: u32 = 0x2000000u;
 const PEELED_HULL: u32 = 0x4000000u;
 
-// Bits of a triangle's pass mask, see src/plan/mod.rs.
+// Bits of a triangle's pass mask, see src/render/plan/mod.rs.
 const PASS_LAYER: u32 = 2u;
 const PASS_FRONT_ONLY: u32 = 8u;
 const PASS_BACK_ONLY: u32 = 16u;
@@ -351,7 +351,7 @@ fn wide_to_f32(v: vec2<u32>) -> f32 {
     return rn(f32(v.y) * 4294967296.0) + f32(v.x);
 }
 
-// Positions of samples as sample_offsets() in src/plan/mod.rs has them, in 1/16 px: a nibble per
+// Positions of samples as sample_offsets() in src/render/plan/mod.rs has them, in 1/16 px: a nibble per
 // sample, the first lowest.
 const ONE_SAMPLE_XY: u32 = 0x8u;
 const FOUR_SAMPLES_X: u32 = 0xA2E6u;

@@ -1,5 +1,5 @@
 // Stages lines and resolve: compositing over the background. The CPU's is in
-// src/backend/cpu/resolve.rs.
+// src/render/backend/cpu/resolve.rs.
 
 // True if the background is part of a pixel's colour already: then the sign of its alpha is set.
 // Otherwise the colour is the surface's over nothing.

@@ -1,5 +1,5 @@
 // Stage resolve, per pixel: blends the background into the colour, unless lines have done so, and
-// converts it to sRGB bytes. Twin of src/backend/cpu/resolve.rs.
+// converts it to sRGB bytes. Twin of src/render/backend/cpu/resolve.rs.
 
 // Per pixel. A negative alpha means that lines have already blended the background into this
 // colour; otherwise it is premultiplied, without background.

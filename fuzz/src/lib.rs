@@ -3,17 +3,17 @@
 
 #![allow(clippy::panic, clippy::unwrap_used, clippy::expect_used)] // a broken promise is a find
 
-use meshsnap::backend::{Backends, GpuHost, HardwareHint};
-use meshsnap::import::{Bundle, BundleFile, Format, ImportReport, Imported, MeshError, Options, import};
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::mesh::material::{AlphaMode, FileLens};
-use meshsnap::pipeline;
-use meshsnap::pipeline::{Job, RenderError};
-use meshsnap::report::{Extras, Report};
-use meshsnap::request;
-use meshsnap::request::Rules;
-use meshsnap::spec::BackendChoice;
+use meshsnap_inspect::report::{Extras, Report};
+use meshsnap_render::backend::{Backends, GpuHost, HardwareHint};
+use meshsnap_render::import::{Bundle, BundleFile, Format, ImportReport, Imported, MeshError, Options, import};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::mesh::material::{AlphaMode, FileLens};
+use meshsnap_render::pipeline;
+use meshsnap_render::pipeline::{Job, RenderError};
+use meshsnap_render::request;
+use meshsnap_render::request::Rules;
+use meshsnap_render::spec::BackendChoice;
 use std::cell::RefCell;
 use std::sync::Arc;
 

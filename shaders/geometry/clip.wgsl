@@ -1,6 +1,6 @@
 // Stage transform, per triangle that reaches behind the eye or far outside the picture: clips it
 // and appends the rest, a fan of up to six triangles, to the work list. Twin of
-// src/backend/cpu/geometry/clip.rs.
+// src/render/backend/cpu/geometry/clip.rs.
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 

@@ -1,5 +1,5 @@
 // Stage transform, per vertex: unit box to snapped screen coordinates. Twin of
-// src/backend/cpu/geometry/transform.rs.
+// src/render/backend/cpu/geometry/transform.rs.
 //
 // It also empties the first band's visibility buffer and the first work list: a command for each would cost the
 // device more than the stores do.

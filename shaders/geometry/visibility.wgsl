@@ -1,5 +1,5 @@
 // Stage visibility, per triangle: the samples that it covers, and its depth at each. Twin of
-// src/backend/cpu/geometry/visibility.rs.
+// src/render/backend/cpu/geometry/visibility.rs.
 //
 // A thread draws a small triangle itself; larger ones go to the work list for visibility_tile.wgsl.
 

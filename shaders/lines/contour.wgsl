@@ -1,5 +1,5 @@
 // Stage lines, per edge: selects silhouettes and removes edges of faces that face away. Twin of
-// src/backend/cpu/lines/contour.rs; edge.wgsl declares the buffers.
+// src/render/backend/cpu/lines/contour.rs; edge.wgsl declares the buffers.
 
 const NO_FACE: u32 = 0xFFFFFFFFu;
 

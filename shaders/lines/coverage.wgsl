@@ -1,5 +1,5 @@
 // Stage lines, per pixel: the union of its strokes, composited over the colours. Twin of
-// src/backend/cpu/lines/coverage.rs.
+// src/render/backend/cpu/lines/coverage.rs.
 
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
 @group(1) @binding(3) var<storage, read> vertices: array<Vertex>;

@@ -1,4 +1,4 @@
-// Stage lines, per edge: lines of exact width. Twin of src/backend/cpu/lines/edge.rs.
+// Stage lines, per edge: lines of exact width. Twin of src/render/backend/cpu/lines/edge.rs.
 //
 // Edges are cut into windows and those into slices of rows: shares. A workgroup has some edges. Its
 // threads look at a share each, to find out where there is something to draw. Those shares are drawn

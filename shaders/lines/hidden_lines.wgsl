@@ -1,5 +1,5 @@
 // Stage lines, per piece of an edge: hidden-line removal, which finds the intervals that no
-// triangle hides. Twin of src/backend/cpu/lines/hidden_lines.rs; edge.wgsl declares the buffers.
+// triangle hides. Twin of src/render/backend/cpu/lines/hidden_lines.rs; edge.wgsl declares the buffers.
 //
 // The threads of a workgroup find the triangles and their intervals together. The CPU sorts the
 // intervals; here they are walked through in order.

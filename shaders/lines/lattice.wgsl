@@ -1,5 +1,5 @@
 // Stage lines: where the points of a pixel lie. No twin: the CPU's are LATTICE in
-// src/backend/cpu/lines/stroke.rs.
+// src/render/backend/cpu/lines/stroke.rs.
 
 // Steps to the pixel in which along and across are measured.
 const UNIT: f32 = 16384.0;

@@ -1,5 +1,5 @@
 // Stage lines, per pixel: the surface's light on lit lines. Twin of
-// src/backend/cpu/lines/line_light.rs.
+// src/render/backend/cpu/lines/line_light.rs.
 //
 // Light is affine in the colour that it falls on: the mean over the samples that see the surface,
 // or, where none does, the light on the line's own face.

@@ -1,5 +1,5 @@
 // Stage lines: what the visibility buffer shows. The CPU's is SampleBand in
-// src/backend/cpu/geometry/samples.rs.
+// src/render/backend/cpu/geometry/samples.rs.
 
 const NOTHING: u32 = 0xFFFFFFFFu;
 

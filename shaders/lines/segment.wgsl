@@ -1,5 +1,5 @@
 // Stage lines, per edge: its position on screen and the pixels along it. Twin of
-// src/backend/cpu/lines/segment.rs; edge.wgsl declares the buffers.
+// src/render/backend/cpu/lines/segment.rs; edge.wgsl declares the buffers.
 
 // Slack for roundings where only too much is harmless, pixels.
 const SLACK_PX: f32 = 0.05;

@@ -1,5 +1,5 @@
 // Stage lines, per edge and triangle: what stands on a sheet that is seen from below. Twin of
-// src/backend/cpu/lines/sheets.rs, which says why; edge.wgsl declares the buffers.
+// src/render/backend/cpu/lines/sheets.rs, which says why; edge.wgsl declares the buffers.
 
 // Least distance of an edge from the sides of a sheet's triangle, 1/256 px. Closer to them it may be an edge of the
 // triangle itself, or of its neighbour, whose vertices are others.

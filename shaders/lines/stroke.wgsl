@@ -1,5 +1,5 @@
 // Stage lines, per stroke and pixel: the covered area and the covered points. Twin of
-// src/backend/cpu/lines/stroke.rs.
+// src/render/backend/cpu/lines/stroke.rs.
 
 // Farthest from the middle of a unit box to its corner.
 const BOX_RADIUS: f32 = 0.70710678;

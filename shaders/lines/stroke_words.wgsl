@@ -1,5 +1,5 @@
 // The lines stage's buffer of strokes, as edge.wgsl adds to it and coverage.wgsl reads it. No twin:
-// the CPU's is a struct, LineCoverage in src/backend/cpu/lines/coverage.rs.
+// the CPU's is a struct, LineCoverage in src/render/backend/cpu/lines/coverage.rs.
 
 // Points in a pixel, and the lattice they lie on: point i is in column i and row GENERATOR * i,
 // modulo POINTS.
@@ -25,7 +25,7 @@ const MASK_WORD: u32 = 3u;
 const MASK_WORDS: u32 = 8u;
 // The largest difference between a stroke's area and its points.
 const SLACK_WORD: u32 = 11u;
-// The area of holes, and the marks below. The CPU's are in Holes, src/backend/cpu/lines/holes/mod.rs.
+// The area of holes, and the marks below. The CPU's are in Holes, src/render/backend/cpu/lines/holes/mod.rs.
 const HOLE_WORD: u32 = 12u;
 // Bit of a pixel in which areas do not tell what is free.
 const MARKED: u32 = 0x80000000u;

@@ -1,4 +1,4 @@
-// Stage mixed: the coverage points of a pixel. Twin of src/backend/cpu/mixed/points.rs.
+// Stage mixed: the coverage points of a pixel. Twin of src/render/backend/cpu/mixed/points.rs.
 
 const POINTS: u32 = 256u;
 const GENERATOR: u32 = 181u;

@@ -1,5 +1,5 @@
 // Stage mixed, per triangle and mixed pixel: lists of the triangles that each pixel may show. Twin of
-// src/backend/cpu/mixed/lists.rs. Items of a list are in no order; nothing depends on it.
+// src/render/backend/cpu/mixed/lists.rs. Items of a list are in no order; nothing depends on it.
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
 @group(1) @binding(31) var<storage, read_write> lists: array<vec4<u32>>;

@@ -1,5 +1,5 @@
 // Stage mixed, per mixed pixel whose points are in memory: its colour by what they see. Twin of
-// src/backend/cpu/mixed/color.rs. Pixels that have lists of triangles go through mixed_parts.wgsl instead.
+// src/render/backend/cpu/mixed/color.rs. Pixels that have lists of triangles go through mixed_parts.wgsl instead.
 
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
 @group(1) @binding(22) var<storage, read_write> mixed: array<u32>;

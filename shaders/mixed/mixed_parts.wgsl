@@ -1,5 +1,5 @@
 // Stage mixed, per mixed pixel: the triangle of its list that each point sees, and so the parts that its colour is the
-// sum of. Twin of src/backend/cpu/mixed/color.rs and faces.rs. The parts' colours: mixed_shade.wgsl; their sum:
+// sum of. Twin of src/render/backend/cpu/mixed/color.rs and faces.rs. The parts' colours: mixed_shade.wgsl; their sum:
 // mixed_sum.wgsl.
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;

@@ -1,5 +1,5 @@
 // Stage mixed, per part of a mixed pixel: what a triangle adds to the pixel's colour. Twin of
-// src/backend/cpu/surface/waiting.rs.
+// src/render/backend/cpu/surface/waiting.rs.
 
 @group(1) @binding(22) var<storage, read> mixed: array<u32>;
 // The parts become colours.

@@ -1,4 +1,4 @@
-// Stage mixed: the buffer of a band's mixed pixels. The CPU's is MixedPixels in src/backend/cpu/mixed/find/pixels.rs.
+// Stage mixed: the buffer of a band's mixed pixels. The CPU's is MixedPixels in src/render/backend/cpu/mixed/find/pixels.rs.
 //
 // Its words:
 // - their number; 1 if there was no room for all lists; and the numbers of items of lists and of parts

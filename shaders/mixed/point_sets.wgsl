@@ -1,5 +1,5 @@
 // Stage mixed, per pixel that a workgroup has in hand: the points that see each of its triangles, as sets. Twin of
-// src/backend/cpu/mixed/points.rs. Sets make the shares of up to as many triangles as there are threads; shares.wgsl
+// src/render/backend/cpu/mixed/points.rs. Sets make the shares of up to as many triangles as there are threads; shares.wgsl
 // looks at all points of a pixel instead, for more.
 
 // By item of the pixel's list: the points that see it, a bit each.

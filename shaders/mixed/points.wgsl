@@ -1,5 +1,5 @@
 // Stage mixed, per triangle and mixed pixel: the points that the triangle covers, and its depth at each. Twin of
-// src/backend/cpu/mixed/triangle/mod.rs.
+// src/render/backend/cpu/mixed/triangle/mod.rs.
 
 @group(1) @binding(22) var<storage, read> mixed: array<u32>;
 
@@ -41,7 +41,7 @@ fn draw_points(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
         }
         return;
     }
-    // Four at a time: a thread may run few iterations only (src/backend/gpu/schedule/tiles.rs).
+    // Four at a time: a thread may run few iterations only (src/render/backend/gpu/schedule/tiles.rs).
     for (var i = 0u; i < POINTS; i += 4u) {
         draw_point(triangle, i, first, id);
         draw_point(triangle, i + 1u, first, id);

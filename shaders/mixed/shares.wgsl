@@ -1,5 +1,5 @@
 // Stage mixed, per pixel that a workgroup has in hand: the share of its points that each triangle has. Twin of
-// src/backend/cpu/mixed/shares.rs.
+// src/render/backend/cpu/mixed/shares.rs.
 
 // The triangle that each point sees, in words like those of samples; and which points are the first ones of their
 // triangles, a bit each.

@@ -1,5 +1,5 @@
 // Stage occlusion, per pixel of every second column and row: looks at places around it and adds up what light they
-// take. Twin of src/backend/cpu/occlusion/gather.rs.
+// take. Twin of src/render/backend/cpu/occlusion/gather.rs.
 
 // Of each job of a gang: places of all pixels of the picture, then what each found.
 @group(1) @binding(30) var<storage, read_write> occlusion: array<u32>;

@@ -1,5 +1,5 @@
 // Stage occlusion, per pixel: the place of what its first sample shows, before the far plane. Twin of
-// src/backend/cpu/occlusion/grid.rs.
+// src/render/backend/cpu/occlusion/grid.rs.
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;

@@ -1,4 +1,4 @@
-// Stage occlusion: places before the far plane. The CPU's are in src/backend/cpu/occlusion/grid.rs.
+// Stage occlusion: places before the far plane. The CPU's are in src/render/backend/cpu/occlusion/grid.rs.
 
 // The place of nothing: so far behind all else that no surface takes light from it.
 const NOWHERE: f32 = -1e15;

@@ -1,5 +1,5 @@
 // Stage occlusion, per pixel: a weighted mean of what pixels around it that show the same surface found. Twin of
-// src/backend/cpu/occlusion/spread.rs.
+// src/render/backend/cpu/occlusion/spread.rs.
 
 @group(1) @binding(30) var<storage, read> occlusion: array<u32>;
 

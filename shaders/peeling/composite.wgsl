@@ -1,5 +1,5 @@
 // Stage shade, per pixel: composites a peeled layer's colours under those of the layers in front of
-// it. Twin of src/backend/cpu/peeling/composite.rs.
+// it. Twin of src/render/backend/cpu/peeling/composite.rs.
 
 // The layer of this round, laid out as the visibility buffer.
 @group(1) @binding(26) var<storage, read> peel_layer: array<vec2<u32>>;

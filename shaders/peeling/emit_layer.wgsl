@@ -1,5 +1,5 @@
 // Stage visibility, per sample of a peeled layer: keeps the nearest triangle behind the previous
-// layer. Twin of src/backend/cpu/peeling/emit_layer.rs.
+// layer. Twin of src/render/backend/cpu/peeling/emit_layer.rs.
 
 // The visibility buffer; `samples` is bound to the layer.
 @group(1) @binding(26) var<storage, read> base: array<vec2<u32>>;

@@ -1,5 +1,5 @@
 // Stage shade, per pixel: the places where composite.wgsl keeps what layers add to a pixel, and
-// coverage.wgsl finds it. Twin of src/backend/cpu/peeling/tints.rs. Both declare `colors`, which
+// coverage.wgsl finds it. Twin of src/render/backend/cpu/peeling/tints.rs. Both declare `colors`, which
 // holds, for all pixels of the band each: colours, the light on lines, the colour that each layer
 // adds, the layers' depths, and their steepness.
 

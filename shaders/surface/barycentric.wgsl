@@ -1,5 +1,5 @@
 // Stage shade, per point: its position in its triangle. Twin of
-// src/backend/cpu/surface/barycentric.rs.
+// src/render/backend/cpu/surface/barycentric.rs.
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;

@@ -1,5 +1,5 @@
 // Stage shade, per point: debug views, which show a triangle's numbers as colours. Twin of
-// src/backend/cpu/surface/debug.rs.
+// src/render/backend/cpu/surface/debug.rs.
 
 // Values of the debug view in a material's flags.
 const DEBUG_BARYCENTRIC: u32 = 1u;

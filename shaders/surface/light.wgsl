@@ -1,4 +1,4 @@
-// Stage shade, per point: light without images. Twin of src/backend/cpu/surface/light.rs.
+// Stage shade, per point: light without images. Twin of src/render/backend/cpu/surface/light.rs.
 //
 // The CPU's bits: a whole flat face has one light, and that may lie on the threshold between two
 // bytes.

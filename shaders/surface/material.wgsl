@@ -1,10 +1,10 @@
-// Stage shade, per triangle: its material. The CPU's is ShadedMaterial in src/plan/surface/mod.rs.
+// Stage shade, per triangle: its material. The CPU's is ShadedMaterial in src/render/plan/surface/mod.rs.
 
 // Triangles' materials, then edge masks, one byte each.
 @group(1) @binding(8) var<storage, read> attributes: array<u32>;
 @group(1) @binding(15) var<storage, read> materials: array<Material>;
 
-// src/plan/surface/mod.rs explains the fields.
+// src/render/plan/surface/mod.rs explains the fields.
 struct Material {
     base_color: vec4<f32>,
     emissive: vec3<f32>,

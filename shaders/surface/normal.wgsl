@@ -1,4 +1,4 @@
-// Stage shade, per point: the normal for lighting. Twin of src/backend/cpu/surface/normal.rs.
+// Stage shade, per point: the normal for lighting. Twin of src/render/backend/cpu/surface/normal.rs.
 
 @group(1) @binding(6) var<storage, read> normals: array<f32>;
 @group(1) @binding(16) var<storage, read> face_normals: array<f32>;

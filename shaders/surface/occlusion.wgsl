@@ -1,5 +1,5 @@
 // Stage shade, per point: the file's occlusion texture, which darkens ambient light and no other. Twin of
-// src/backend/cpu/surface/occlusion.rs.
+// src/render/backend/cpu/surface/occlusion.rs.
 
 // The light without the ambient part that the texture's red takes away.
 fn occluded(lit_here: Light, strength: f32, red: f32, metallic: f32, n: vec3<f32>) -> Light {

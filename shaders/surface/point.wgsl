@@ -1,5 +1,5 @@
 // Stage shade, per point: the colour of a point of the surface. Twin of
-// src/backend/cpu/surface/point.rs.
+// src/render/backend/cpu/surface/point.rs.
 
 // Three indices per triangle, for each kind of corner value that does not go by position.
 @group(1) @binding(7) var<storage, read> corner_triangles: array<u32>;

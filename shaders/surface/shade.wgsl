@@ -1,5 +1,5 @@
 // Stage shade, per pixel: the colour of each visible triangle. Twin of
-// src/backend/cpu/surface/shade.rs.
+// src/render/backend/cpu/surface/shade.rs.
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;

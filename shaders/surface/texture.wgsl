@@ -1,8 +1,8 @@
-// Stage shade, per point: texture lookups. Twin of src/backend/cpu/surface/texture/mod.rs: the same
+// Stage shade, per point: texture lookups. Twin of src/render/backend/cpu/surface/texture/mod.rs: the same
 // bits, because texels decide what a mask leaves and where nearest texels change.
 
 @group(1) @binding(18) var<storage, read> uvs: array<vec2<f32>>;
-// Four items an image, as `TextureEntry` in src/backend/gpu/params.rs has them; then texels, two halves a word.
+// Four items an image, as `TextureEntry` in src/render/backend/gpu/params.rs has them; then texels, two halves a word.
 @group(1) @binding(20) var<storage, read> texels: array<vec2<u32>>;
 
 // Items of the texels' buffer per image, in front of the texels.

@@ -1,5 +1,5 @@
 // Stage shade, per point: wires from barycentric coordinates. Twin of
-// src/backend/cpu/surface/wire.rs.
+// src/render/backend/cpu/surface/wire.rs.
 
 // 1 on the wire, 0 away from it.
 fn wire_cover(id: u32, at: vec2<f32>, m: u32, b: Barycentrics) -> f32 {

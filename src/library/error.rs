@@ -1,12 +1,12 @@
 //! Errors of the library, by who is at fault.
 
-use crate::backend::DrawError;
-use crate::encode::EncodeError;
-use crate::import::MeshError;
-use crate::limits::Stopped;
-use crate::pipeline::RenderError;
-use crate::plan::PlanError;
-use crate::request::RequestError;
+use meshsnap_render::backend::DrawError;
+use meshsnap_render::encode::EncodeError;
+use meshsnap_render::import::MeshError;
+use meshsnap_render::limits::Stopped;
+use meshsnap_render::pipeline::RenderError;
+use meshsnap_render::plan::PlanError;
+use meshsnap_render::request::RequestError;
 
 /// Errors of reading a mesh, making a spec, drawing or encoding. [`Error::fault`] says who can mend
 /// it.
@@ -31,9 +31,6 @@ pub enum Error {
     /// The encoder failed.
     #[error(transparent)]
     Encode(#[from] EncodeError),
-    /// Anything else that is this crate's fault.
-    #[error("{0}")]
-    Internal(String),
 }
 
 /// The party that can mend an [`Error`].
@@ -57,7 +54,7 @@ impl Error {
             Self::Mesh(_) => Fault::Mesh,
             Self::Request(_) | Self::Plan(_) => Fault::Request,
             Self::Stopped(_) => Fault::Deadline,
-            Self::Draw(_) | Self::Encode(_) | Self::Internal(_) => Fault::Machine,
+            Self::Draw(_) | Self::Encode(_) => Fault::Machine,
         }
     }
 }
@@ -70,8 +67,6 @@ impl From<RenderError> for Error {
             RenderError::Stopped(error) => Self::Stopped(error),
             RenderError::Draw(error) => Self::Draw(error),
             RenderError::Encode(error) => Self::Encode(error),
-            // Pictures have none.
-            RenderError::Report(error) => Self::Internal(error.to_string()),
         }
     }
 }

@@ -4,18 +4,18 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 
-use super::Error;
-use crate::import::{self, Bundle, BundleFile, Format, MeshError, MeshFault, Options, Origin};
-use crate::limits::{Budget, Deadline, Limits};
-use crate::pipeline::Model;
-use crate::warning::Warning;
+use crate::Error;
+use meshsnap_render::import::{self, Bundle, BundleFile, Format, MeshError, MeshFault, Options, Origin};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::pipeline::Model;
+use meshsnap_render::warning::Warning;
 
 /// A mesh, imported once and drawn as often as needed: welded, finite, in a unit box.
 /// Edges, textures and vertex normals that a picture needs are kept for the next one. Clones share
 /// them.
 #[derive(Clone, Debug)]
 pub struct Mesh {
-    pub(super) model: Arc<Model>,
+    pub(crate) model: Arc<Model>,
 }
 
 impl Mesh {

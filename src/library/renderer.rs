@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use super::{Error, Mesh, Spec};
-use crate::backend::{BackendKind, Backends, GpuHost, HardwareHint};
-use crate::image::Image;
-use crate::limits::{Budget, Deadline, Limits};
-use crate::pipeline;
-use crate::plan::Skip;
-use crate::spec::BackendChoice;
-use crate::warning::Warning;
+use crate::{Error, Mesh, Spec};
+use meshsnap_render::backend::{BackendKind, Backends, GpuHost, HardwareHint};
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::pipeline;
+use meshsnap_render::plan::Skip;
+use meshsnap_render::spec::BackendChoice;
+use meshsnap_render::warning::Warning;
 
 /// Draws meshes. Keeps its buffers, and its GPU if it has one, from picture to picture: make one and
 /// use it often.
@@ -19,6 +19,7 @@ use crate::warning::Warning;
 /// ```
 /// use meshsnap::{Mesh, Renderer, Spec};
 ///
+/// # std::env::set_current_dir("../..")?;
 /// let mesh = Mesh::read(&std::fs::read("api/examples/knot.obj")?)?;
 /// let mut renderer = Renderer::cpu();
 /// for view in ["front", "left", "top", "iso"] {

@@ -1,9 +1,9 @@
 //! The request as a Rust value: a style and the keys of the request document.
 
-use super::Error;
-use crate::limits::Limits;
-use crate::request::{self, Rules};
-use crate::spec::{self, BackendChoice};
+use crate::Error;
+use meshsnap_render::limits::Limits;
+use meshsnap_render::request::{self, Rules};
+use meshsnap_render::spec::{self, BackendChoice};
 
 /// A request: a style, and the keys of the request document that override it.
 ///
@@ -91,7 +91,7 @@ impl Spec {
     }
 
     /// The spec that the pipeline knows: defaults filled in, every value in range.
-    pub(super) fn understood(&self) -> Result<spec::Spec, Error> {
+    pub(crate) fn understood(&self) -> Result<spec::Spec, Error> {
         let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
         Ok(request::read(self.document.as_deref(), &self.overrides, &rules)?)
     }

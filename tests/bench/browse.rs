@@ -25,9 +25,9 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use meshsnap::encode::encode;
-use meshsnap::image::{Image, ImageFormat};
-use meshsnap::limits::Deadline;
+use meshsnap_render::encode::encode;
+use meshsnap_render::image::{Image, ImageFormat};
+use meshsnap_render::limits::Deadline;
 use served::{Answer, ask, resident_bytes, start_on};
 
 /// Cameras of each mesh, unless each request has its own.

@@ -20,15 +20,15 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use meshes::MeshFile;
-use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
-use meshsnap::backend::{DrawTimes, Renderer as _};
-use meshsnap::import::{self, Bundle};
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::{self, DrawPlan, Prepared};
-use meshsnap::request::{self, Rules};
-use meshsnap::scene::Scene;
-use meshsnap::spec::BackendChoice;
+use meshsnap_render::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
+use meshsnap_render::backend::{DrawTimes, Renderer as _};
+use meshsnap_render::import::{self, Bundle};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::{self, DrawPlan, Prepared};
+use meshsnap_render::request::{self, Rules};
+use meshsnap_render::scene::Scene;
+use meshsnap_render::spec::BackendChoice;
 
 const LOOKS: [&str; 4] = ["flat", "auto", "wire", "outline"];
 

@@ -14,10 +14,10 @@
 
 use std::time::Instant;
 
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::mesh::charts::{Charts, overlaps};
-use meshsnap::mesh::intersections::{self_intersections, t_junctions};
+use meshsnap_inspect::geometry::charts::{Charts, overlaps};
+use meshsnap_inspect::geometry::intersections::{self_intersections, t_junctions};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
 
 fn main() {
     // 2 * 707^2 triangles are a million.

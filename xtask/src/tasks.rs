@@ -26,7 +26,7 @@ const STORED: [Stored; 4] = [
         name: "tables",
         filter: "the_shipped_table_is_what_was_measured",
         write: ("MESHSNAP_GOLDEN", "write"),
-        path: "src/plan/quality/error_table.json",
+        path: "src/render/plan/quality/error_table.json",
     },
     Stored {
         name: "examples",
@@ -103,12 +103,15 @@ pub fn lint() -> Result {
 /// Checks the library and its programs without features, with each alone, and with all. Runs the tests of what is off by
 /// default.
 pub fn features() -> Result {
-    let check = ["check", "--locked", "--package", "meshsnap"];
-    run(cargo(&[&check[..], &["--no-default-features"]].concat()))?;
-    for feature in &feature_names()? {
-        run(cargo(&[&check[..], &["--no-default-features", "--features", feature]].concat()))?;
+    // The crates in the middle are checked with these two: each of their features is one of theirs.
+    for package in ["meshsnap", "meshsnap-cli"] {
+        let check = ["check", "--locked", "--package", package];
+        run(cargo(&[&check[..], &["--no-default-features"]].concat()))?;
+        for feature in &feature_names(package)? {
+            run(cargo(&[&check[..], &["--no-default-features", "--features", feature]].concat()))?;
+        }
+        run(cargo(&[&check[..], &["--all-features"]].concat()))?;
     }
-    run(cargo(&[&check[..], &["--all-features"]].concat()))?;
     let mut traces = cargo(&["test", "--locked", "--features", "otel", "--test", "suite", "--", "jobs::traces"]);
     // These are few tests: nearly all of the time goes to the compiler.
     traces.env("CARGO_PROFILE_DEV_OPT_LEVEL", "0");
@@ -134,7 +137,7 @@ pub fn cross() -> Result {
             println!("{system} was not checked: the target is not installed (rustup target add {target})");
             continue;
         }
-        let mut check = cargo(&["check", "--locked", "--package", "meshsnap", "--target", target]);
+        let mut check = cargo(&["check", "--locked", "--package", "meshsnap-cli", "--target", target]);
         // `cargo check` links nothing, so C is not compiled either: that would take the other system's compiler and headers.
         for tool in ["CC", "CXX", "AR", "RANLIB"] {
             check.env(format!("{tool}_{}", target.replace('-', "_")), "true");
@@ -144,9 +147,9 @@ pub fn cross() -> Result {
     Ok(())
 }
 
-/// The names in the `[features]` table of the manifest, but for `default`.
-fn feature_names() -> std::result::Result<Vec<String>, String> {
-    let path = root().join("Cargo.toml");
+/// The names in the `[features]` table of a package's manifest, but for `default`.
+fn feature_names(package: &str) -> std::result::Result<Vec<String>, String> {
+    let path = root().join(if package == "meshsnap" { "src/library/Cargo.toml" } else { "Cargo.toml" });
     let manifest = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
     let table = manifest.lines().skip_while(|line| line.trim() != "[features]").skip(1);
     let names = table.take_while(|line| !line.starts_with('[')).filter_map(|line| line.split_once(" = ["));
@@ -154,10 +157,22 @@ fn feature_names() -> std::result::Result<Vec<String>, String> {
     Ok(names.filter(|name| !name.starts_with('#') && name != "default").collect())
 }
 
-/// Makes the archive that a registry would get, builds it, and looks at what is in it.
+/// The crates that a registry would get, each after those that it needs.
+const PUBLISHED: [&str; 5] = ["meshsnap-render", "meshsnap", "meshsnap-inspect", "meshsnap-server", "meshsnap-cli"];
+
+/// Makes the archives that a registry would get, builds them, and looks at what is in them.
 pub fn package(options: &[&str]) -> Result {
-    let of_crate = ["--locked", "--package", "meshsnap"];
-    let mut list = cargo(&[&["package", "--list"], &of_crate[..], options].concat());
+    let of_crates: Vec<&str> = PUBLISHED.iter().flat_map(|name| ["--package", name]).chain(["--locked"]).collect();
+    let mut package = cargo(&[&["package"], &of_crates[..], options].concat());
+    // They are built, and nothing of them runs.
+    package.env("CARGO_PROFILE_DEV_OPT_LEVEL", "0");
+    run(package)?;
+    PUBLISHED.iter().try_for_each(|name| look_into_archive(name, options))
+}
+
+/// Refuses an archive that is too large, or holds what only the repository needs.
+fn look_into_archive(name: &str, options: &[&str]) -> Result {
+    let mut list = cargo(&[&["package", "--list", "--locked", "--package", name], options].concat());
     let listed = list.current_dir(root()).stderr(Stdio::inherit()).output();
     let listed = listed.map_err(|error| format!("cargo package cannot be run: {error}"))?;
     let files = String::from_utf8_lossy(&listed.stdout);
@@ -166,19 +181,17 @@ pub fn package(options: &[&str]) -> Result {
         ["tests/", "fuzz/", "xtask/"].into_iter().any(is_under) || file.ends_with(".png") || file.ends_with(".webp")
     };
     if let Some(stray) = files.lines().find(is_stray) {
-        return Err(format!("the archive would hold {stray}: see `exclude` in Cargo.toml"));
+        return Err(format!("the archive of {name} would hold {stray}: see its Cargo.toml"));
     }
-    let mut package = cargo(&[&["package"], &of_crate[..], options].concat());
-    // It is built, and nothing of it runs.
-    package.env("CARGO_PROFILE_DEV_OPT_LEVEL", "0");
-    run(package)?;
     let folder = root().join("target/package");
     let archives = std::fs::read_dir(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    let archives = archives.flatten().filter(|entry| entry.path().extension().is_some_and(|e| e == "crate"));
-    let bytes = archives.filter_map(|entry| entry.metadata().ok()).map(|data| data.len()).max().unwrap_or(0);
-    println!("{} files, {bytes} bytes", files.lines().count());
-    if bytes > ARCHIVE_BYTES_MAX {
-        return Err(format!("the archive has {bytes} bytes, and the most is {ARCHIVE_BYTES_MAX}"));
+    let is_of_crate =
+        |file: &str| file.strip_prefix(name).is_some_and(|rest| rest.starts_with("-0") && rest.ends_with(".crate"));
+    let archive = archives.flatten().find(|entry| is_of_crate(&entry.file_name().to_string_lossy()));
+    let bytes = archive.and_then(|entry| entry.metadata().ok()).map_or(0, |data| data.len());
+    println!("{name}: {} files, {bytes} bytes", files.lines().count());
+    if bytes == 0 || bytes > ARCHIVE_BYTES_MAX {
+        return Err(format!("the archive of {name} has {bytes} bytes, and may have 1 to {ARCHIVE_BYTES_MAX}"));
     }
     Ok(())
 }

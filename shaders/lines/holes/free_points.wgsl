@@ -1,5 +1,5 @@
 // Stage lines, per marked pixel: the points that its faces leave free. Twin of
-// src/backend/cpu/lines/holes/free_points.rs. coverage.wgsl declares the buffers.
+// src/render/backend/cpu/lines/holes/free_points.rs. coverage.wgsl declares the buffers.
 
 // A side of an inset: the points at least `least` along the normal lie inside. Both in 1/16384 px.
 struct HalfPlane {

@@ -1,5 +1,5 @@
 // Stage lines, per pixel: what the lines along all edges of a surface leave free of it. Twin of
-// src/backend/cpu/lines/holes/mod.rs.
+// src/render/backend/cpu/lines/holes/mod.rs.
 //
 // The CPU goes from face to face. A thread here looks for the faces that are seen in its pixel and
 // the eight around it, so that no two threads add to the same sum.

@@ -1,5 +1,5 @@
 // Stage lines, per face: the part of it that its lines leave free. Twin of
-// src/backend/cpu/lines/holes/inset/mod.rs. The kernels declare the buffers.
+// src/render/backend/cpu/lines/holes/inset/mod.rs. The kernels declare the buffers.
 
 // Distance from a face's sides from which a sample counts as inside, 1/256 px.
 const INSIDE: f32 = 16.0;

@@ -1,5 +1,5 @@
 // Stage lines, per triangle: its tips, which are corners in front of all that their pixel shows, of which no sample of
-// the pixel shows the triangle. Twin of src/backend/cpu/lines/holes/tips.rs.
+// the pixel shows the triangle. Twin of src/render/backend/cpu/lines/holes/tips.rs.
 
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
 @group(1) @binding(3) var<storage, read> vertices: array<Vertex>;

@@ -1,5 +1,5 @@
 // Stage mixed, per pixel of a band and one more on each side: where colours break off from sample to sample. Twin of
-// find_breaks in src/backend/cpu/mixed/find/mod.rs.
+// find_breaks in src/render/backend/cpu/mixed/find/mod.rs.
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<u32>;
 

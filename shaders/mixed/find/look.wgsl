@@ -1,5 +1,5 @@
 // Stage mixed, per face: what decides its colour, as far as that is known without shading it. Twin of
-// src/backend/cpu/mixed/find/look.rs.
+// src/render/backend/cpu/mixed/find/look.rs.
 
 // Squared differences over sums up to which faces look alike, and up to which they differ slightly.
 const ALIKE: f32 = 0.020833334;

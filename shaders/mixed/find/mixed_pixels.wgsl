@@ -1,5 +1,5 @@
 // Stage mixed, per pixel: the mixed pixels, and the number of each. Twin of join and leave_layers in
-// src/backend/cpu/mixed/find/mod.rs. Numbers are in no order; nothing depends on it.
+// src/render/backend/cpu/mixed/find/mod.rs. Numbers are in no order; nothing depends on it.
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
 // Peeled layers per sample.

@@ -1,5 +1,5 @@
 // Stage mixed, per triangle: those that are so thin that samples miss them, as hairs and slivers. Twin of
-// src/backend/cpu/mixed/find/thin.rs and thinness.rs.
+// src/render/backend/cpu/mixed/find/thin.rs and thinness.rs.
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
 
@@ -155,7 +155,7 @@ fn line_at(origin: vec2<i32>, slope: f32, along: i32) -> i32 {
 // colours break off.
 fn mark(s: Setup, e: Edges, pixel: vec2<i32>, id: u32) {
     // Adaptive plans have four samples, or 16 where they have layers. They are written out, because a thread may run few
-    // iterations only (src/backend/gpu/schedule/tiles.rs).
+    // iterations only (src/render/backend/gpu/schedule/tiles.rs).
     let first = four_from(s, pixel, 0);
     var any_behind = any(first.are_behind);
     var is_seen = any(first.ids == vec4(id));

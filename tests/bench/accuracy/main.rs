@@ -5,7 +5,7 @@
 //!     cargo bench --bench accuracy -- --quick                 # few and small scenes, few rounds; under a minute
 //!     cargo bench --bench accuracy -- --scene 'deep rings'    # one scene, as often as it is named
 //!     cargo bench --bench accuracy -- --write                 # all, and docs/accuracy.{json,md}, docs/*.svg of it
-//!                                                             # and src/plan/quality/error_table.json
+//!                                                             # and src/render/plan/quality/error_table.json
 //!     cargo bench --bench accuracy -- --table-only            # the last of these, from docs/accuracy.json as it is
 //!
 //! Truth and the count of errors: `measure/truths.rs`. The request of each technique:
@@ -31,7 +31,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind};
+use meshsnap_render::backend::gpu::{AtomicsChoice, Gpu, GpuKind};
 
 use measure::scenes::{SCENES, Scene};
 use measure::table::{Machine, method, table};
@@ -124,6 +124,7 @@ fn write_table() {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(root.join("docs/accuracy.json")).expect("docs/accuracy.json");
     let document = serde_json::from_str(&text).expect("docs/accuracy.json is JSON");
-    std::fs::write(root.join("src/plan/quality/error_table.json"), condensed::table(&document)).expect("a table");
-    println!("wrote src/plan/quality/error_table.json");
+    std::fs::write(root.join("src/render/plan/quality/error_table.json"), condensed::table(&document))
+        .expect("a table");
+    println!("wrote src/render/plan/quality/error_table.json");
 }

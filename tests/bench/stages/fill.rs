@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use std::hint::black_box;
 use std::time::Instant;
 
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::import::Bundle;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::import::Bundle;
 
 use crate::rounds::{draw, import, plan, spec};
 

@@ -4,9 +4,9 @@
 use std::fmt::Write as _;
 use std::time::Instant;
 
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::import::Bundle;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::import::Bundle;
+use meshsnap_render::mesh::Mesh;
 
 use crate::meshes::{Torus, layers, needles, obj, specks, stl};
 use crate::plot::{self, Point};

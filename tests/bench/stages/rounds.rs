@@ -3,17 +3,17 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::{DrawError, Renderer as _};
-use meshsnap::encode;
-use meshsnap::image::{Image, ImageFormat};
-use meshsnap::import::{Bundle, Imported};
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::{self, DrawPlan};
-use meshsnap::request::{self, Rules};
-use meshsnap::scene::Scene;
-use meshsnap::spec::{BackendChoice, DEFAULT_EFFORT, Spec};
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::{DrawError, Renderer as _};
+use meshsnap_render::encode;
+use meshsnap_render::image::{DEFAULT_EFFORT, Image, ImageFormat};
+use meshsnap_render::import::{Bundle, Imported};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::{self, DrawPlan};
+use meshsnap_render::request::{self, Rules};
+use meshsnap_render::scene::Scene;
+use meshsnap_render::spec::{BackendChoice, Spec};
 
 use crate::meshes::MeshFile;
 use crate::reference::Reference;
@@ -112,7 +112,8 @@ fn limits() -> Limits {
 pub fn import(bundle: &Bundle) -> Mesh {
     let limits = limits();
     let Imported { mesh, .. } =
-        meshsnap::import::import(bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap();
+        meshsnap_render::import::import(bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default())
+            .unwrap();
     mesh
 }
 

@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use meshsnap::backend::Renderer as _;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::import::Bundle;
+use meshsnap_render::backend::Renderer as _;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::import::Bundle;
 
 use crate::meshes::MeshFile;
 use crate::rounds::{draw, import, plan, spec};

@@ -1,7 +1,7 @@
 //! Triangles and lines that reach behind the eye are where they should be.
 
-use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, sample_offsets};
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::{DrawPlan, sample_offsets};
 
 use crate::accuracy::wires::{SIZE_PX, line_plan, segment_ink};
 use crate::oracle::vector::{V2, V3, cross, dot};

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use meshsnap::spec::{Samples, WireMethod};
+use meshsnap_render::spec::{Samples, WireMethod};
 
 use crate::measure::scenes::{SCENES, SMALL, Scene};
 use crate::measure::table::{Machine, table};

@@ -3,11 +3,11 @@
 
 use std::path::{Path, PathBuf};
 
-use meshsnap::limits::Limits;
-use meshsnap::plan;
-use meshsnap::request;
-use meshsnap::request::Rules;
-use meshsnap::spec::{BackendChoice, Samples};
+use meshsnap_render::limits::Limits;
+use meshsnap_render::plan;
+use meshsnap_render::request;
+use meshsnap_render::request::Rules;
+use meshsnap_render::spec::{BackendChoice, Samples};
 
 use crate::measure::scenes::{SCENES, Scene, UNSEEN};
 use crate::measure::techniques::{Family, Technique};
@@ -31,7 +31,7 @@ fn root() -> PathBuf {
 fn the_shipped_table_is_what_was_measured() {
     let measured = std::fs::read_to_string(root().join("docs/accuracy.json")).unwrap();
     let made = condensed::table(&serde_json::from_str(&measured).unwrap());
-    let path = root().join("src/plan/quality/error_table.json");
+    let path = root().join("src/render/plan/quality/error_table.json");
     if std::env::var_os("MESHSNAP_GOLDEN").is_some_and(|v| v == "write") {
         std::fs::write(&path, &made).unwrap();
         panic!("{} was written: look at it, then run without MESHSNAP_GOLDEN", path.display());

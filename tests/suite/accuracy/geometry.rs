@@ -1,10 +1,10 @@
 //! The samples that triangles own: each exactly once, up to and behind the eye, on every machine
 //! alike.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
-use meshsnap::limits::Deadline;
-use meshsnap::plan::DrawPlan;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::{CpuRenderer, Isa};
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::DrawPlan;
 
 use crate::accuracy::behind_eye::eye_plan;
 use crate::oracle::coverage::{Coverage, classify, snap};

@@ -1,10 +1,10 @@
 //! The gates can fail: wrong pictures, each made wrong in the way of a known technique, do not get
 //! through. The right ones, made by the same means, do.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::limits::Deadline;
-use meshsnap::plan::DrawPlan;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::DrawPlan;
 
 use crate::accuracy::behind_eye::eye_plan;
 use crate::accuracy::geometry::{Ownership, jittered_net};

@@ -1,10 +1,10 @@
 //! The light that hollows go without, against many rays.
 
-use meshsnap::backend::Renderer as _;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::Renderer as _;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
 
 use crate::oracle::screen::Screen;
 use crate::oracle::surface::occlusion::shut;
@@ -75,7 +75,7 @@ fn occlusion_is_that_of_many_rays() {
 }
 
 /// Pixels that show one face, and the light that they go without.
-fn truth(mesh: &Mesh, spec: &meshsnap::spec::Spec) -> Vec<([u32; 2], f64)> {
+fn truth(mesh: &Mesh, spec: &meshsnap_render::spec::Spec) -> Vec<([u32; 2], f64)> {
     let plan = scenes::plan(mesh, spec);
     let scene = scene(&plan);
     let screen = Screen::new(&scene);

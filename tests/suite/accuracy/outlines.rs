@@ -3,11 +3,11 @@
 //! outline in units of the model is as wide as these are at the depth of the point of the contour
 //! that it surrounds.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::Projection;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::Projection;
 
 use crate::support::families::outlines::{SHAPES, Shape};
 use crate::support::scenes;

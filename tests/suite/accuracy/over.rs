@@ -1,10 +1,10 @@
 //! The accuracy of colours where lines lie over a surface and its border: against the oracle's
 //! points, in bytes' steps, of pixels that see both the line and what is beside it.
 
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::plan::DrawPlan;
-use meshsnap::spec::Spec;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::DrawPlan;
+use meshsnap_render::spec::Spec;
 
 use crate::oracle::lines::coverage::ink;
 use crate::oracle::screen::Screen;

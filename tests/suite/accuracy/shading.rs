@@ -1,8 +1,8 @@
 //! The colours of whole pixels of one face, and the normals behind them.
 
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, flags};
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::{DrawPlan, flags};
 
 use crate::oracle::obj::Shape;
 use crate::oracle::screen::Screen;

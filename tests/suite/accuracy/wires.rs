@@ -5,8 +5,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use meshsnap::backend::Renderer;
-use meshsnap::plan::{DrawPlan, Edge, LinePass};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::plan::{DrawPlan, Edge, LinePass};
 
 use crate::oracle::lines::{capsule, strip};
 use crate::oracle::surface::visible::Segment;

@@ -5,9 +5,9 @@ use crate::support::files::damage::{cut_everywhere, mutate};
 use crate::support::files::fbx::{Value, ascii, binary, file, geometry, model, node, property};
 use crate::support::files::mesh::{Solid, codes, read, read_limited};
 use crate::support::files::ply::{ENCODINGS, Ply, XYZ};
-use meshsnap::import::{Format, MeshFault};
-use meshsnap::limits::Limits;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::import::{Format, MeshFault};
+use meshsnap_render::limits::Limits;
+use meshsnap_render::mesh::Mesh;
 
 /// The ends of a line or point in the file's own numbers, and its material.
 type End = ([[f64; 3]; 2], u32);

@@ -5,8 +5,8 @@ use crate::support::files::damage::{cut_everywhere, mutate};
 use crate::support::files::mesh::{Solid, codes, read, read_as, read_limited};
 use crate::support::files::same::assert_same_shape;
 use crate::support::server::Server;
-use meshsnap::import::{Format, MeshFault};
-use meshsnap::limits::Limits;
+use meshsnap_render::import::{Format, MeshFault};
+use meshsnap_render::limits::Limits;
 
 /// A box with `extra` words after the position of each vertex, and `color` after each face.
 fn off(head: &str, extra: &str, color: &str) -> String {

@@ -6,12 +6,12 @@ use crate::support::server::meshsnap;
 use crate::support::shapes::{Obj, cube, torus};
 use crate::support::truth::cases;
 use crate::support::work::within_bytes;
-use meshsnap::import::ImportReport;
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::edges::EdgeList;
-use meshsnap::mesh::topology::Topology;
-use meshsnap::mesh::{Mesh, ToFile};
-use meshsnap::report::{Extras, Report};
+use meshsnap_inspect::report::{Extras, Report};
+use meshsnap_render::import::ImportReport;
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::edges::EdgeList;
+use meshsnap_render::mesh::topology::Topology;
+use meshsnap_render::mesh::{Mesh, ToFile};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 

@@ -5,10 +5,10 @@
 use crate::support::files::mesh::{Gltf, Solid, read, read_as};
 use crate::support::files::ply::Encoding;
 use crate::support::files::same::{assert_same_shape, edges};
-use meshsnap::import::Format;
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::UpAxis;
-use meshsnap::mesh::topology::Topology;
+use meshsnap_render::import::Format;
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::UpAxis;
+use meshsnap_render::mesh::topology::Topology;
 use serde_json::json;
 
 #[test]

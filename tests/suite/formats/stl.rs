@@ -3,9 +3,9 @@
 use crate::support::files::damage::{cut_everywhere, mutate};
 use crate::support::files::mesh::{Solid, codes, read, read_limited};
 use crate::support::files::same::assert_same_shape;
-use meshsnap::import::{Format, MeshFault};
-use meshsnap::limits::Limits;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::import::{Format, MeshFault};
+use meshsnap_render::limits::Limits;
+use meshsnap_render::mesh::Mesh;
 
 fn triangles() -> Solid {
     Solid::cuboid().triangulated(&[[0, 2, 3], [4, 5, 7], [0, 1, 5]])

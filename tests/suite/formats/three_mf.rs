@@ -6,10 +6,10 @@ use crate::support::files::mesh::{Read, Solid, codes, read, read_as, read_limite
 use crate::support::files::same::assert_same_shape;
 use crate::support::server::Server;
 use crate::support::work::within_bytes;
-use meshsnap::import::{Bundle, Format, MeshError, MeshFault, import};
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::UpAxis;
-use meshsnap::mesh::material::AlphaMode;
+use meshsnap_render::import::{Bundle, Format, MeshError, MeshFault, import};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::UpAxis;
+use meshsnap_render::mesh::material::AlphaMode;
 
 const TYPES: &str = r#"<?xml version="1.0"?><Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
 <Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>"#;

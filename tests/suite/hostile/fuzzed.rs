@@ -1,6 +1,6 @@
 //! The fuzz targets, without a fuzzer: what they are, and that every seed and every former find passes.
 
-use meshsnap::import::{Format, Imported};
+use meshsnap_render::import::{Format, Imported};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

@@ -13,8 +13,8 @@ use crate::formats::gltf::packed::Sheet;
 use crate::support::files::bundle::{read_bundle, zipped};
 use crate::support::files::fbx::{Node, ascii, binary};
 use crate::support::server::{CUBE_OBJ, Server, meshsnap};
-use meshsnap::import::Bundle;
 use meshsnap::{Mesh, Renderer, Spec};
+use meshsnap_render::import::Bundle;
 
 /// An FBX file that makes the process which reads it misbehave.
 fn misbehaving(how: &str) -> Vec<u8> {

@@ -7,8 +7,8 @@ use super::structure::{code, sources};
 const OF_UNIX: [&str; 4] = ["std::os::unix", "std::os::fd", "tokio::signal::unix", "signal_hook::"];
 const OF_LINUX: [&str; 6] = ["std::os::linux", "rustix::", "libc::", "landlock::", "seccompiler::", "memmap2::"];
 
-/// The module that is Linux's as a whole: `lib.rs` says so.
-const LINUX_ROOM: &str = "sandbox/";
+/// The module that is Linux's as a whole: `main.rs` says so.
+const LINUX_ROOM: &str = "program/sandbox/";
 
 #[test]
 fn code_of_one_system_is_gated() {
@@ -27,8 +27,8 @@ fn code_of_one_system_is_gated() {
             }
         }
     }
-    let root = sources().into_iter().find(|(file, _)| file == "lib.rs").unwrap().1;
-    let room = root.lines().position(|line| line == "pub mod sandbox;").unwrap();
+    let root = sources().into_iter().find(|(file, _)| file == "program/main.rs").unwrap().1;
+    let room = root.lines().position(|line| line == "mod sandbox;").unwrap();
     assert!(is_gated(&root, room + 1, &["target_os = \"linux\""]), "the sandbox is Linux's");
     assert!(found >= 20, "only {found} mentions found: the scan is broken");
     assert!(faults.is_empty(), "for one system alone, and without a `cfg`:\n{}", faults.join("\n"));

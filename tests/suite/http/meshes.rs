@@ -9,7 +9,7 @@ use crate::http::answers::FORM;
 use crate::support::files::bundle::zipped;
 use crate::support::files::mesh::Solid;
 use crate::support::server::{Answer, CUBE_OBJ, Server, meshsnap};
-use meshsnap::service::digest::Digest;
+use meshsnap_server::digest::Digest;
 
 /// The path of a stored mesh of these bytes.
 pub fn url(bytes: &[u8]) -> String {

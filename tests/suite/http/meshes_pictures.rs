@@ -5,7 +5,7 @@ use crate::http::meshes::{head, url};
 use crate::support::files::bundle::zipped;
 use crate::support::files::mesh::Solid;
 use crate::support::server::{CUBE_OBJ, Server};
-use meshsnap::service::digest::Digest;
+use meshsnap_server::digest::Digest;
 
 const JSON: &str = "Content-Type: application/json";
 

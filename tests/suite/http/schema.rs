@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use jsonschema::Validator;
-use meshsnap::limits::Limits;
-use meshsnap::request;
-use meshsnap::request::Rules;
-use meshsnap::spec::BackendChoice;
+use meshsnap_render::limits::Limits;
+use meshsnap_render::request;
+use meshsnap_render::request::Rules;
+use meshsnap_render::spec::BackendChoice;
 
 use crate::support::server::Server;
 

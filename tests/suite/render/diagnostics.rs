@@ -3,11 +3,11 @@
 
 use std::f64::consts::TAU;
 
-use meshsnap::backend::Renderer as _;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::Renderer as _;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
 
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};

@@ -4,14 +4,14 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::{Deadline, Limits};
-use meshsnap::request;
-use meshsnap::request::Rules;
-use meshsnap::spec::BackendChoice;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::request;
+use meshsnap_render::request::Rules;
+use meshsnap_render::spec::BackendChoice;
 
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};

@@ -9,10 +9,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, DrawingThreads, Isa};
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::{CpuRenderer, DrawingThreads, Isa};
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
 
 use crate::support::scenes::{self, SCENES, Scene};
 use crate::support::truth::goal;

@@ -1,12 +1,12 @@
 //! Hulls of very many edges: what they are made of is bounded, and they end soon when their job
 //! does.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::{Deadline, Limits};
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
 
 use crate::support::families::outlines::SHAPES;
 use crate::support::families::soups::Random;

@@ -3,12 +3,12 @@
 
 use std::borrow::Cow;
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::{Image, srgb8_thresholds};
-use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, Faces, PeelingPass, ShadedMaterial, SurfacePass, flags, pass_mask};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::{CpuRenderer, Isa};
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::{Image, srgb8_thresholds};
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::{DrawPlan, Faces, PeelingPass, ShadedMaterial, SurfacePass, flags, pass_mask};
 
 use crate::support::families::soups::{KINDS, Kind, Random, Soup, View};
 use crate::support::gpus::gpus;

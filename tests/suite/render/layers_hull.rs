@@ -1,13 +1,13 @@
 //! Outlines of glass, and outlines that differ from part to part.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::DrawPlan;
-use meshsnap::spec::{Hidden, Layers, Spec};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::DrawPlan;
+use meshsnap_render::spec::{Hidden, Layers, Spec};
 
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
@@ -73,13 +73,13 @@ fn glass_shows_the_outlines_of_others_behind_it() {
     // From the left, the ball named "right" is larger and behind the other.
     let mesh = scenes::mesh(&shapes::two_balls());
     let mut spec = outlined("left");
-    spec.camera.projection = meshsnap::spec::ProjectionKind::Orthographic;
+    spec.camera.projection = meshsnap_render::spec::ProjectionKind::Orthographic;
     glass(&mut spec.layers);
     let mut rear = spec.layers;
     spec.layers.outline = None;
     rear.outline.iter_mut().for_each(|outline| outline.thickness = Some(2.0));
     spec.materials = vec![("left".into(), rear)];
-    spec.camera.view = meshsnap::spec::NamedView::Right;
+    spec.camera.view = meshsnap_render::spec::NamedView::Right;
     // Now the one named "left", which has an outline, is behind.
     let plan = scenes::plan(&mesh, &spec);
     let shown = draw(&plan, "another's outline behind glass");
@@ -115,8 +115,8 @@ fn outlines_may_be_thicker_on_one_part() {
         let thickness = |mut layers: Layers, t| {
             if let Some(outline) = &mut layers.outline {
                 outline.unit = match unit {
-                    "px" => meshsnap::spec::OutlineUnit::Px,
-                    _ => meshsnap::spec::OutlineUnit::Object,
+                    "px" => meshsnap_render::spec::OutlineUnit::Px,
+                    _ => meshsnap_render::spec::OutlineUnit::Object,
                 };
                 outline.thickness = Some(t);
             }

@@ -3,12 +3,12 @@
 //! `MESHSNAP_CONTACT_SHEET=FILE.png` also stores them all in one picture, to be looked at.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
 
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};

@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use image::ImageFormat;
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::{self, PlanError, Prepared};
-use meshsnap::scene::Scene;
-use meshsnap::spec::Spec;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::{self, PlanError, Prepared};
+use meshsnap_render::scene::Scene;
+use meshsnap_render::spec::Spec;
 
 use rayon::prelude::*;
 use serde_json::json;

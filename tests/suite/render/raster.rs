@@ -1,9 +1,9 @@
 //! The CPU rasterizer against an independent brute-force count in integers.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
-use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, sample_offsets};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::{CpuRenderer, Isa};
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::{DrawPlan, sample_offsets};
 
 use crate::support::scenes;
 use crate::support::shapes::Random;

@@ -6,15 +6,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuKind;
-use meshsnap::backend::{
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuKind;
+use meshsnap_render::backend::{
     BackendKind, Backends, CostModel, DrawError, GpuHost, GpuState, HardwareHint, Opener, Renderer as _,
 };
-use meshsnap::limits::Deadline;
-use meshsnap::plan::DrawPlan;
-use meshsnap::service::warm_up::WarmUp;
-use meshsnap::spec::BackendChoice;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::DrawPlan;
+use meshsnap_render::spec::BackendChoice;
+use meshsnap_server::warm_up::WarmUp;
 
 use crate::support::fake_gpus::{Act, Machine, Open, job};
 use crate::support::server::{CUBE_OBJ, Server, meshsnap};

@@ -1,11 +1,11 @@
 //! The CPU's shortcuts change nothing: small triangles in lanes, what lies behind tiles, colours
 //! found once per triangle, rows that are encoded while others are drawn.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
-use meshsnap::encode;
-use meshsnap::image::{ImageFormat, RowSink};
-use meshsnap::limits::Deadline;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::{CpuRenderer, Isa};
+use meshsnap_render::encode;
+use meshsnap_render::image::{ImageFormat, RowSink};
+use meshsnap_render::limits::Deadline;
 
 use crate::support::scenes::{self, SCENES};
 use crate::support::shapes;

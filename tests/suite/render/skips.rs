@@ -1,13 +1,13 @@
 //! Skips change no byte: every scene, with each skip turned off in turn, and all at once.
 
 use image::ImageFormat;
-use meshsnap::backend::Renderer as _;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::limits::{Deadline, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::{DrawPlan, SkipKind};
-use meshsnap::spec::Spec;
+use meshsnap_render::backend::Renderer as _;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::{DrawPlan, SkipKind};
+use meshsnap_render::spec::Spec;
 
 use crate::render::textures::levels as textures;
 use crate::support::files::mesh::Noise;

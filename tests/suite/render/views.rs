@@ -1,9 +1,9 @@
 //! Cameras that look past the mesh: said where the picture is blank, and nowhere else.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::limits::Deadline;
-use meshsnap::plan;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan;
 
 use crate::support::server::{Server, meshsnap};
 use crate::support::shapes::Random;

@@ -2,10 +2,10 @@
 //! a million kilometres.
 
 use glam::{DVec2, DVec3};
-use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, Projection};
-use meshsnap::scene::camera::Camera;
-use meshsnap::spec;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::{DrawPlan, Projection};
+use meshsnap_render::scene::camera::Camera;
+use meshsnap_render::spec;
 
 use crate::oracle::obj::Shape;
 use crate::support::scenes;

@@ -1,7 +1,7 @@
 //! Thin faces, faces without area, sizes that do not go together, and numbers that are none.
 
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::import::MeshFault;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::import::MeshFault;
 
 use crate::oracle::obj::Shape;
 use crate::oracle::vector::{V3, cross, dot, length, unit};

@@ -4,13 +4,13 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use meshsnap::backend::HardwareHint;
-use meshsnap::backend::cpu::DrawingThreads;
-use meshsnap::import::Bundle;
-use meshsnap::limits::{Lender, Limits};
-use meshsnap::service::jobs::{CpuThreads, Job, JobSettings, JobState, Jobs, Owner, Task, Work, pipeline_renderers};
-use meshsnap::service::memory::{Account, Memory};
-use meshsnap::service::residents::Residents;
+use meshsnap_render::backend::HardwareHint;
+use meshsnap_render::backend::cpu::DrawingThreads;
+use meshsnap_render::import::Bundle;
+use meshsnap_render::limits::{Lender, Limits};
+use meshsnap_server::jobs::{CpuThreads, Job, JobSettings, JobState, Jobs, Owner, Task, Work, pipeline_renderers};
+use meshsnap_server::memory::{Account, Memory};
+use meshsnap_server::residents::Residents;
 
 use crate::support::fake_gpus::{Machine, Open};
 use crate::support::scenes;

@@ -1,9 +1,9 @@
 //! Self-intersections and T-junctions of small meshes of every kind, against exact clipping of all pairs
 //! (`tests/oracle/contacts.rs`).
 
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::mesh::intersections::{self_intersections, t_junctions};
+use meshsnap_inspect::geometry::intersections::{self_intersections, t_junctions};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
 
 use crate::oracle::contacts::{self, Point};
 

@@ -1,7 +1,7 @@
 //! The picture is the mesh's, not the file's: the order of faces and vertices and their winding
 //! leave no trace.
 
-use meshsnap::image::Image;
+use meshsnap_render::image::Image;
 
 use crate::oracle::obj::Shape;
 use crate::support::families::moved::{LOOKS, MESHES, differing, draw, is_blank, shape};

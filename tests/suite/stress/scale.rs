@@ -1,7 +1,7 @@
 //! A model is the same model in millimetres and in light years.
 
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::mesh::Mesh;
 
 use crate::support::families::moved::{LOOKS, MESHES, differing, draw, is_blank, shape};
 use crate::support::scenes;

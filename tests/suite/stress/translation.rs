@@ -1,9 +1,9 @@
 //! A model far from the origin is the same model as long as its file says so; where the file
 //! cannot, that is said.
 
-use meshsnap::import::MeshFault;
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::DrawPlan;
+use meshsnap_render::import::MeshFault;
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::DrawPlan;
 
 use crate::oracle::camera::project;
 use crate::oracle::obj::Shape;

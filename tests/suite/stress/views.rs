@@ -1,12 +1,12 @@
 //! Awkward views: through a keyhole and all around, pictures of one pixel and of millions, from
 //! inside, edge on.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::import::MeshFault;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::DrawPlan;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::import::MeshFault;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::DrawPlan;
 
 use crate::support::families::moved::{LOOKS, MESHES, draw, is_blank};
 use crate::support::files::mesh::read;

@@ -5,12 +5,12 @@ use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::{GpuInfo, GpuKind};
-use meshsnap::backend::{BackendKind, CostModel, DrawError, GpuDevice, GpuHost, HardwareHint, Opener, Renderer};
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::plan::DrawPlan;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::{GpuInfo, GpuKind};
+use meshsnap_render::backend::{BackendKind, CostModel, DrawError, GpuDevice, GpuHost, HardwareHint, Opener, Renderer};
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::DrawPlan;
 
 use crate::support::scenes;
 

@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use meshsnap::backend::DrawError;
-use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind};
+use meshsnap_render::backend::DrawError;
+use meshsnap_render::backend::gpu::{AtomicsChoice, Gpu, GpuKind};
 
 use super::skip::{Need, skip};
 

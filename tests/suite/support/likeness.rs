@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use meshsnap::image::Image;
+use meshsnap_render::image::Image;
 
 /// A bound on what two back-ends may differ by.
 #[derive(Clone, Copy, Debug)]

@@ -1,15 +1,15 @@
 //! The fixed scenes that every back-end draws, and how to make a mesh, a spec and a plan in a test.
 
-use meshsnap::import::Bundle;
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::plan;
-use meshsnap::plan::{DrawPlan, Faces, PlanError, Projection, ShadedMaterial, SkipKind, SurfacePass};
-use meshsnap::request;
-use meshsnap::request::Rules;
-use meshsnap::spec::BackendChoice;
-use meshsnap::spec::color::Rgba;
-use meshsnap::spec::{DebugView, Layers, Spec, WireEdges, WireThickness};
+use meshsnap_render::import::Bundle;
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan;
+use meshsnap_render::plan::{DrawPlan, Faces, PlanError, Projection, ShadedMaterial, SkipKind, SurfacePass};
+use meshsnap_render::request;
+use meshsnap_render::request::Rules;
+use meshsnap_render::spec::BackendChoice;
+use meshsnap_render::spec::color::Rgba;
+use meshsnap_render::spec::{DebugView, Layers, Spec, WireEdges, WireThickness};
 
 use crate::support::shapes;
 
@@ -200,9 +200,9 @@ pub fn mesh(obj: &str) -> Mesh {
 }
 
 /// Imports with default limits.
-pub fn mesh_of(bytes: &[u8]) -> Result<Mesh, meshsnap::import::MeshError> {
+pub fn mesh_of(bytes: &[u8]) -> Result<Mesh, meshsnap_render::import::MeshError> {
     let limits = Limits::default();
-    meshsnap::import::import(
+    meshsnap_render::import::import(
         &Bundle::of_one(bytes.to_vec()),
         None,
         &limits,
@@ -233,7 +233,7 @@ pub fn try_plan<'a>(
     keep: &[SkipKind],
 ) -> Result<DrawPlan<'a>, PlanError> {
     let mut budget = Budget::new(limits);
-    let scene = meshsnap::scene::Scene::new(mesh, spec, &mut budget)?;
+    let scene = meshsnap_render::scene::Scene::new(mesh, spec, &mut budget)?;
     plan::build_keeping(&scene, &mut budget, deadline, keep)
 }
 

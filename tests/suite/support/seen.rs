@@ -1,6 +1,6 @@
 //! From plans to what the oracle works with.
 
-use meshsnap::plan::{DrawPlan, Faces, Shown, SurfacePass};
+use meshsnap_render::plan::{DrawPlan, Faces, Shown, SurfacePass};
 
 use crate::oracle::camera::{Camera, project};
 use crate::oracle::coverage::{Coverage, classify, snap};

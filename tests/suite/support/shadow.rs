@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use meshsnap::plan::Projection;
+use meshsnap_render::plan::Projection;
 
 use crate::oracle::lattice;
 use crate::oracle::screen::{Piece, Scene, Screen};

@@ -1,7 +1,7 @@
 //! The work of a job, in units that other load on the machine cannot change: bytes allocated
 //! and deadline polls. Times belong into benches.
 
-use meshsnap::limits::Deadline;
+use meshsnap_render::limits::Deadline;
 
 use super::allocations;
 

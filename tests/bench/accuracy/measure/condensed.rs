@@ -1,4 +1,4 @@
-//! `src/plan/quality/error_table.json`: what was measured, a row for each technique on each kind of
+//! `src/render/plan/quality/error_table.json`: what was measured, a row for each technique on each kind of
 //! back-end with each number of samples. The program chooses by it where a request asks for an
 //! error or a time.
 

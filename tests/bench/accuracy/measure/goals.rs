@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use meshsnap::spec::{Samples, WireMethod};
+use meshsnap_render::spec::{Samples, WireMethod};
 
 use super::summary::{lead, point, range};
 use super::table::{Machine, method};

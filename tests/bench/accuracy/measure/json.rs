@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use meshsnap::spec::Samples;
+use meshsnap_render::spec::Samples;
 use serde_json::{Value, json};
 
 use super::scenes::Scene;

@@ -20,10 +20,10 @@ pub mod truths;
 
 use std::sync::Arc;
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::{Gpu, GpuRenderer};
-use meshsnap::spec::Samples;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::{Gpu, GpuRenderer};
+use meshsnap_render::spec::Samples;
 
 /// Visibility samples a pixel, and adaptive ones where a picture can have them.
 pub const SAMPLES: &[Samples] =

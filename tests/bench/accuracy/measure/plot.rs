@@ -7,7 +7,7 @@ use super::summary::{Point, Series, series};
 use super::table::Machine;
 use super::techniques::{Family, Technique};
 use super::{BASELINE, Row};
-use meshsnap::spec::Samples;
+use meshsnap_render::spec::Samples;
 
 const SIZE: [f64; 2] = [720.0, 430.0];
 /// Top and bottom of the plots; the legend is below.

@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::{DrawPlan, samplers};
-use meshsnap::spec::{Samples, WireMethod};
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::{DrawPlan, samplers};
+use meshsnap_render::spec::{Samples, WireMethod};
 
 use super::scenes::{Scene, plan};
 use super::techniques::{Family, Technique};

@@ -2,15 +2,15 @@
 
 use std::path::PathBuf;
 
-use meshsnap::import::Bundle;
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::plan;
-use meshsnap::plan::DrawPlan;
-use meshsnap::request;
-use meshsnap::request::Rules;
-use meshsnap::spec::BackendChoice;
-use meshsnap::spec::Spec;
+use meshsnap_render::import::Bundle;
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan;
+use meshsnap_render::plan::DrawPlan;
+use meshsnap_render::request;
+use meshsnap_render::request::Rules;
+use meshsnap_render::spec::BackendChoice;
+use meshsnap_render::spec::Spec;
 
 use super::meshes;
 use super::techniques::Family;
@@ -112,7 +112,7 @@ impl Scene {
     pub fn mesh(&self, size_px: u32) -> Mesh {
         let limits = Limits::default();
         let bundle = Bundle::of_one(self.bytes(size_px));
-        meshsnap::import::import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default())
+        meshsnap_render::import::import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default())
             .unwrap_or_else(|e| panic!("{}: {e}", self.name))
             .mesh
     }
@@ -165,7 +165,7 @@ impl Scene {
 /// Plans with default limits.
 pub fn plan<'a>(mesh: &'a Mesh, spec: &Spec) -> DrawPlan<'a> {
     let mut budget = Budget::new(&Limits::default());
-    let scene = meshsnap::scene::Scene::new(mesh, spec, &mut budget).expect("a scene");
+    let scene = meshsnap_render::scene::Scene::new(mesh, spec, &mut budget).expect("a scene");
     plan::build(&scene, &mut budget, &Deadline::default()).expect("a plan")
 }
 

@@ -1,6 +1,6 @@
 //! Rows of many scenes as one point, and what follows from them.
 
-use meshsnap::spec::{Samples, WireMethod};
+use meshsnap_render::spec::{Samples, WireMethod};
 
 use super::Row;
 use super::techniques::{Family, Technique};

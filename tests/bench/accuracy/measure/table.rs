@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use meshsnap::backend::gpu::GpuInfo;
+use meshsnap_render::backend::gpu::GpuInfo;
 
 use super::{BASELINE, Effort, Row};
 

@@ -14,7 +14,7 @@
 
 use std::sync::LazyLock;
 
-use meshsnap::spec::{Samples, ThicknessUnit, WIRE_METHODS, WireMethod};
+use meshsnap_render::spec::{Samples, ThicknessUnit, WIRE_METHODS, WireMethod};
 
 use super::scenes::Scene;
 use super::{SAMPLES, WHOLE_SAMPLES};

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::io::Cursor;
 
 use image::{DynamicImage, GrayImage, ImageFormat};
-use meshsnap::plan::DrawPlan;
+use meshsnap_render::plan::DrawPlan;
 use serde_json::json;
 
 use crate::oracle::screen::Screen;

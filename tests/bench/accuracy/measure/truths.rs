@@ -1,7 +1,7 @@
 //! The truth of a scene, and a picture's distance from it.
 
-use meshsnap::image::Image;
-use meshsnap::plan::DrawPlan;
+use meshsnap_render::image::Image;
+use meshsnap_render::plan::DrawPlan;
 
 use super::techniques::{Family, Technique};
 use super::textured;

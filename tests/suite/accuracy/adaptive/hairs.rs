@@ -1,9 +1,9 @@
 //! Faces that are thinner than the distance of samples: adaptive samples show as much of them as there is.
 
-use meshsnap::backend::Renderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::plan::DrawPlan;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::DrawPlan;
 
 use crate::oracle::obj::Shape;
 use crate::oracle::surface::srgb;
@@ -83,7 +83,7 @@ fn painted(obj: &str) -> String {
     text
 }
 
-fn spec_of(samples: &str, has_sheet: bool) -> meshsnap::spec::Spec {
+fn spec_of(samples: &str, has_sheet: bool) -> meshsnap_render::spec::Spec {
     let size = SIZE_PX.to_string();
     let mut keys = vec![
         ("size", &size[..]),

@@ -1,7 +1,7 @@
 //! Metals that mirror sharply: their light changes within a face, so that adaptive samples shade each quarter of a pixel.
 
-use meshsnap::plan::DrawPlan;
-use meshsnap::spec::Samples;
+use meshsnap_render::plan::DrawPlan;
+use meshsnap_render::spec::Samples;
 
 use super::Truth;
 use crate::measure::meshes;
@@ -18,7 +18,7 @@ type Named = (&'static str, fn() -> String);
 const MESHES: [Named; 3] =
     [("coarse torus", || shapes::torus(24)), ("fine torus", || shapes::torus(96)), ("ball", || meshes::icosphere(4))];
 
-fn plan<'a>(mesh: &'a meshsnap::mesh::Mesh, roughness: &str, samples: Samples) -> DrawPlan<'a> {
+fn plan<'a>(mesh: &'a meshsnap_render::mesh::Mesh, roughness: &str, samples: Samples) -> DrawPlan<'a> {
     let keys = [
         ("size", cases("64x56", "320x280")),
         ("style", "smooth"),

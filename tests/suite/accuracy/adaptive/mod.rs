@@ -4,9 +4,9 @@
 pub mod hairs;
 pub mod mirrors;
 
-use meshsnap::backend::Renderer;
-use meshsnap::limits::Deadline;
-use meshsnap::plan::DrawPlan;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::DrawPlan;
 
 use crate::measure::meshes;
 use crate::oracle::screen::Screen;
@@ -88,7 +88,7 @@ impl Truth {
     }
 }
 
-fn plan_of<'a>(mesh: &'a meshsnap::mesh::Mesh, (name, _, style, light): &Case) -> DrawPlan<'a> {
+fn plan_of<'a>(mesh: &'a meshsnap_render::mesh::Mesh, (name, _, style, light): &Case) -> DrawPlan<'a> {
     let size = cases("64x56", "320x280");
     let keys = [("size", size), ("style", style), ("light.preset", light), ("samples", "adaptive")];
     let metal = if name.starts_with("metal") {

@@ -2,8 +2,8 @@
 //! each pixel of what its points show.
 
 use image::{DynamicImage, GrayImage, ImageFormat, RgbImage, RgbaImage};
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
 use serde_json::{Value, json};
 
 use super::{HEIGHT, View, WIDTH, draw, rmse};
@@ -77,7 +77,7 @@ fn mid(floor: Floor, pixel: &Pixel) -> [f64; 2] {
 }
 
 /// The error of those pixels for which `counts` is true, and their number.
-fn error(pixels: &[Pixel], image: &meshsnap::image::Image, counts: impl Fn(&Pixel) -> bool) -> (f64, usize) {
+fn error(pixels: &[Pixel], image: &meshsnap_render::image::Image, counts: impl Fn(&Pixel) -> bool) -> (f64, usize) {
     let chosen: Vec<&Pixel> = pixels.iter().filter(|pixel| counts(pixel)).collect();
     let of = |pixel: &&Pixel| f64::from(image.pixel(pixel.at[0], pixel.at[1])[0]) - pixel.truth;
     (rmse(chosen.iter().map(of)), chosen.len())

@@ -3,11 +3,11 @@
 mod kinds;
 
 use image::{DynamicImage, GrayImage, ImageFormat};
-use meshsnap::backend::Renderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
-use meshsnap::spec::Spec;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::spec::Spec;
 
 use crate::oracle::surface::srgb;
 use crate::oracle::surface::texture::{Grey, trilinear};

@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use crate::support::files::mesh::Read;
-use meshsnap::import::{Bundle, BundleFile, Folder, Format, MeshFault, import};
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::material::ImageContent;
+use meshsnap_render::import::{Bundle, BundleFile, Folder, Format, MeshFault, import};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::material::ImageContent;
 use std::path::Path;
 
 use crate::support::data;

@@ -8,7 +8,7 @@ use crate::http::answers::FORM;
 use crate::render::textures::levels::encode;
 use crate::support::files::bundle::{Model, files, read_bundle, zipped};
 use crate::support::server::{Answer, CUBE_OBJ, Server, meshsnap};
-use meshsnap::import::Bundle;
+use meshsnap_render::import::Bundle;
 
 /// A form of parts: name, file name if any, content.
 fn form_of(parts: &[(&str, Option<&str>, &[u8])]) -> Vec<u8> {

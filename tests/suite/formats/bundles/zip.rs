@@ -2,8 +2,8 @@
 //! fast.
 
 use crate::support::files::archive::{Raw, archive};
-use meshsnap::import::{Bundle, MeshFault, import};
-use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap_render::import::{Bundle, MeshFault, import};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
 
 use crate::support::files::bundle::{read_bundle, zipped};
 use crate::support::files::mesh::Noise;

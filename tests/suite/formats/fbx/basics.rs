@@ -8,10 +8,10 @@ use crate::support::files::fbx::{
 use crate::support::files::mesh::{Solid, codes, read, read_limited};
 use crate::support::files::same::assert_same_shape;
 use crate::support::server::Server;
-use meshsnap::import::{Bundle, Format, MeshFault, import};
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::UpAxis;
-use meshsnap::mesh::material::{AlphaMode, ImageContent};
+use meshsnap_render::import::{Bundle, Format, MeshFault, import};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::UpAxis;
+use meshsnap_render::mesh::material::{AlphaMode, ImageContent};
 
 type Writer = fn(&[Node]) -> Vec<u8>;
 

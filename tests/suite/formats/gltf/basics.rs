@@ -1,13 +1,13 @@
 //! glTF: primitive modes, accessor encodings, the node tree, buffers, extensions.
 
 use crate::support::files::mesh::{Gltf, Read, corners, read};
-use meshsnap::import::MeshFault;
+use meshsnap_render::import::MeshFault;
 use serde_json::{Value, json};
 
 /// Six points that make a zigzag band.
 const BAND: [f32; 18] = [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.5, 1.0, 1.0, 0.0, 2.0, 0.0, 0.25, 2.0, 1.0, 0.0];
 
-fn band(indices: Option<&[u16]>, mode: u32) -> Result<Read, meshsnap::import::MeshError> {
+fn band(indices: Option<&[u16]>, mode: u32) -> Result<Read, meshsnap_render::import::MeshError> {
     let mut gltf = Gltf::default();
     let position = gltf.floats("VEC3", &BAND);
     let mut primitive = json!({ "attributes": { "POSITION": position }, "mode": mode });

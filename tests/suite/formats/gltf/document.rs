@@ -1,7 +1,7 @@
 //! glTF: the document and its container, buffers and extensions.
 
 use crate::support::files::mesh::{Solid, glb, read};
-use meshsnap::import::MeshFault;
+use meshsnap_render::import::MeshFault;
 use serde_json::{Value, json};
 
 #[test]

@@ -1,8 +1,8 @@
 //! glTF: instances, and nodes that are hidden.
 
 use crate::support::files::mesh::{Gltf, Solid, corners, read, read_limited};
-use meshsnap::import::{MeshError, MeshFault};
-use meshsnap::limits::Limits;
+use meshsnap_render::import::{MeshError, MeshFault};
+use meshsnap_render::limits::Limits;
 use serde_json::{Value, json};
 
 fn instanced() -> Gltf {

@@ -4,12 +4,12 @@ use crate::support::data;
 use crate::support::files::bundle::read_bundle;
 use crate::support::files::mesh::{Gltf, Read, Solid, assert_close, corners, read};
 use crate::support::scenes;
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::import::{Bundle, BundleFile};
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::import::{Bundle, BundleFile};
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
 use serde_json::json;
 use std::path::Path;
 

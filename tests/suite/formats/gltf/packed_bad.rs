@@ -3,7 +3,7 @@
 use crate::formats::gltf::packed::Sheet;
 use crate::support::files::mesh::{Noise, read, set};
 use crate::support::work::within_bytes;
-use meshsnap::import::MeshFault;
+use meshsnap_render::import::MeshFault;
 use serde_json::{Value, json};
 
 #[test]

@@ -4,7 +4,7 @@ use crate::support::data;
 use crate::support::files::mesh::codes;
 use crate::support::files::mesh::{Gltf, assert_close, corners, read, read_at, set};
 use crate::support::server::{Server, meshsnap};
-use meshsnap::import::MeshFault;
+use meshsnap_render::import::MeshFault;
 use serde_json::{Value, json};
 
 const TRIANGLE: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];

@@ -3,7 +3,7 @@
 use crate::formats::gltf::surfaces::surface;
 use crate::support::files::mesh::codes;
 use crate::support::files::mesh::{Gltf, read};
-use meshsnap::mesh::material::FileLens;
+use meshsnap_render::mesh::material::FileLens;
 use serde_json::json;
 
 #[test]

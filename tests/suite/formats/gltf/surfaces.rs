@@ -3,9 +3,9 @@
 use crate::support::data;
 use crate::support::files::bundle::read_bundle;
 use crate::support::files::mesh::{Gltf, codes, read};
-use meshsnap::import::{Bundle, BundleFile, MeshError, MeshFault};
-use meshsnap::mesh::material::{AlphaMode, ImageContent, TextureRef, Wrap};
-use meshsnap::mesh::{MaterialSlot, Mesh};
+use meshsnap_render::import::{Bundle, BundleFile, MeshError, MeshFault};
+use meshsnap_render::mesh::material::{AlphaMode, ImageContent, TextureRef, Wrap};
+use meshsnap_render::mesh::{MaterialSlot, Mesh};
 use serde_json::{Value, json};
 use std::path::Path;
 

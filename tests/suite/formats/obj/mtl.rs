@@ -1,8 +1,8 @@
 //! MTL: what each statement becomes, and libraries that are broken or hostile.
 
 use crate::support::work::within_bytes;
-use meshsnap::import::{Bundle, MeshError, MeshFault};
-use meshsnap::mesh::material::{AlphaMode, ImageContent, MaterialSlot, Wrap};
+use meshsnap_render::import::{Bundle, MeshError, MeshFault};
+use meshsnap_render::mesh::material::{AlphaMode, ImageContent, MaterialSlot, Wrap};
 
 use crate::support::files::bundle::{files, read_bundle};
 use crate::support::files::mesh::{Noise, Read, codes};

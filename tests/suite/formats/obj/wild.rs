@@ -5,7 +5,7 @@ use crate::support::files::bundle::{files, read_bundle};
 use crate::support::files::damage::{cut_everywhere, mutate};
 use crate::support::files::mesh::{Solid, codes, read, read_as};
 use crate::support::files::same::assert_same_shape;
-use meshsnap::import::{Bundle, Format};
+use meshsnap_render::import::{Bundle, Format};
 
 fn utf16(text: &str, order: fn(u16) -> [u8; 2]) -> Vec<u8> {
     format!("\u{feff}{text}").encode_utf16().flat_map(order).collect()

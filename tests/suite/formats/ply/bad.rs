@@ -4,7 +4,7 @@ use crate::support::data::{self, large_folder};
 use crate::support::files::mesh::{read, read_as};
 use crate::support::files::ply::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
 use crate::support::work::within_bytes;
-use meshsnap::import::{Format, MeshError, MeshFault};
+use meshsnap_render::import::{Format, MeshError, MeshFault};
 
 /// Bytes that a broken file may allocate.
 const COST_MAX: u64 = 16 << 20;

@@ -3,8 +3,8 @@
 use crate::support::files::mesh::{Noise, Solid, read, read_as, read_limited};
 use crate::support::files::ply::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
 use crate::support::work::within_bytes;
-use meshsnap::import::{Format, MeshFault};
-use meshsnap::limits::Limits;
+use meshsnap_render::import::{Format, MeshFault};
+use meshsnap_render::limits::Limits;
 
 /// Bytes that a changed file of a kilobyte may allocate.
 const COST_MAX: u64 = 16 << 20;

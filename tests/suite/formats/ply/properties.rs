@@ -5,11 +5,11 @@ use crate::support::files::ply::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
 use crate::support::files::same::assert_same_shape;
 use crate::support::scenes;
 use crate::support::server::Server;
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::import::Format;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::{Mesh, UpAxis};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::import::Format;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::{Mesh, UpAxis};
 
 /// A solid with quads, a pentagon and a concave hexagon: an L on a slab with a gable.
 fn polygons() -> Solid {

@@ -5,12 +5,12 @@ use crate::support::files::mesh::codes;
 use crate::support::files::mesh::read;
 use crate::support::files::ply::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
 use crate::support::scenes;
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::import::Bundle;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
-use meshsnap::mesh::material::ImageContent;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::import::Bundle;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::mesh::material::ImageContent;
 
 fn corner<T: Copy>(mesh: &Mesh, values: &[T], triangle: usize, corner: usize) -> T {
     values[mesh.attribute_triangles[triangle][corner] as usize]

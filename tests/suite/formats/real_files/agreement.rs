@@ -11,11 +11,10 @@ use crate::support::files::bundle::zipped;
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
 use crate::support::server::{Answer, Server};
-use meshsnap::image::Image;
-use meshsnap::import::{Bundle, BundleFile, Format, survey};
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::pipeline;
-use meshsnap::report::Extras;
+use meshsnap_inspect::report::Extras;
+use meshsnap_render::image::Image;
+use meshsnap_render::import::{Bundle, BundleFile, Format, survey};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -188,8 +187,15 @@ fn totals(files: &[(String, Vec<u8>)], is_said_gltf: bool, is_drawn: bool) -> Op
     let surveyed = survey(&bundle, format, &limits, &mut Budget::new(&limits), &Deadline::default());
     let surveyed = surveyed.ok()?.content.map(|c| [c.draw_calls, c.vertices, c.triangles]);
     if is_drawn {
-        let report =
-            pipeline::inspect(&bundle, format, Extras::default(), &limits, &Deadline::default(), &mut |_| {}).unwrap();
+        let report = meshsnap_inspect::report::inspect(
+            &bundle,
+            format,
+            Extras::default(),
+            &limits,
+            &Deadline::default(),
+            &mut |_| {},
+        )
+        .unwrap();
         let report: Value = serde_json::from_str(&report.json().unwrap()).unwrap();
         let content = &report["file_content"];
         let inspected = ["draw_calls", "vertices", "triangles"].map(|key| content[key].as_u64());

@@ -3,7 +3,7 @@
 use crate::support::data::{self, files};
 use crate::support::files::mesh::read;
 use crate::support::work::within_bytes;
-use meshsnap::import::MeshFault;
+use meshsnap_render::import::MeshFault;
 use std::path::Path;
 
 fn extension(path: &Path) -> String {

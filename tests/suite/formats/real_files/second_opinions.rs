@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::support::files::mesh::Read;
 use base64::Engine as _;
 use gltf::mesh::Mode;
-use meshsnap::import::{Bundle, BundleFile};
+use meshsnap_render::import::{Bundle, BundleFile};
 
 use crate::support::data::{self, files};
 use crate::support::files::bundle::read_bundle;

@@ -3,7 +3,7 @@
 use crate::support::files::mesh::{Noise, Solid, glb, read, read_as};
 use crate::support::files::ply::Encoding;
 use crate::support::work::within_bytes;
-use meshsnap::import::{Format, MeshFault};
+use meshsnap_render::import::{Format, MeshFault};
 use serde_json::json;
 
 const FORMATS: [Format; 6] = [Format::Obj, Format::Gltf, Format::Glb, Format::StlBinary, Format::StlAscii, Format::Ply];

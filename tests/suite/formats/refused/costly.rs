@@ -5,8 +5,8 @@ use crate::support::files::fbx::{Node, Value, ascii, binary, file, geometry, mod
 use crate::support::files::mesh::{Gltf, Noise, Solid, read, read_limited};
 use crate::support::truth::{cases, is_long};
 use crate::support::work::within_bytes;
-use meshsnap::import::{MeshError, MeshFault};
-use meshsnap::limits::Limits;
+use meshsnap_render::import::{MeshError, MeshFault};
+use meshsnap_render::limits::Limits;
 use serde_json::{Value as Json, json};
 
 type Writer = fn(&[Node]) -> Vec<u8>;

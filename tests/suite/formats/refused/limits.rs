@@ -1,7 +1,7 @@
 //! Meshes made to cost a lot: refused by a limit, in time, before anything is allocated.
 
-use meshsnap::import::{Bundle, MeshFault, import};
-use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap_render::import::{Bundle, MeshFault, import};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
 use serde_json::{Value, json};
 
 use crate::support::files::mesh::{Gltf, Solid, read, read_limited};

@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use meshsnap::limits::Limits;
-use meshsnap::request::{self, Rules};
-use meshsnap::spec::BackendChoice;
+use meshsnap_render::limits::Limits;
+use meshsnap_render::request::{self, Rules};
+use meshsnap_render::spec::BackendChoice;
 use serde_json::Value;
 
 use super::document;

@@ -8,7 +8,7 @@ use crate::http::meshes::{form_of, url};
 use crate::support::files::bundle::zipped;
 use crate::support::server::{CUBE_OBJ, Server, meshsnap};
 use crate::support::shapes::torus;
-use meshsnap::service::digest::Digest;
+use meshsnap_server::digest::Digest;
 
 const JSON: &str = "Content-Type: application/json";
 

@@ -1,10 +1,10 @@
 //! Adaptive samples beside what is transparent: pixels that show nothing of it are drawn from points, as if it were not
 //! there, and all others have 16 samples.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::plan::DrawPlan;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::{CpuRenderer, Isa};
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::plan::DrawPlan;
 
 use super::{draw, last_of_each};
 use crate::support::gpus::gpus;
@@ -42,7 +42,7 @@ fn pixels_without_a_layer_are_as_if_there_were_none() {
     let clear = [("background", "transparent"), ("samples", "16")];
     let glass = draw(&mut renderer, &scenes::plan(&glass, &scenes::spec(&last_of_each(&keys(&clear)))));
 
-    let pixels = |image: &meshsnap::image::Image| image.rgba.as_chunks::<4>().0.to_vec();
+    let pixels = |image: &meshsnap_render::image::Image| image.rgba.as_chunks::<4>().0.to_vec();
     let [found, fixed, alone, glass] = [&found, &fixed, &alone, &glass].map(pixels);
     let (mut changed, mut as_alone) = (0, 0);
     for i in (0..found.len()).filter(|&i| found[i] != fixed[i]) {

@@ -5,12 +5,12 @@ mod layers;
 mod quarters;
 mod steps;
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, pass_mask};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::{CpuRenderer, Isa};
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::{DrawPlan, pass_mask};
 
 use crate::support::gpus::{gpus, own_gpus};
 use crate::support::likeness::{Likeness, Tolerance};
@@ -40,7 +40,7 @@ fn each_plan(mut each: impl FnMut(&str, &mut DrawPlan<'_>)) {
     for scene in SCENES {
         let mesh = scenes::mesh(&(scene.obj)());
         let mut spec = scene.spec();
-        spec.image.samples = meshsnap::spec::Samples::Adaptive;
+        spec.image.samples = meshsnap_render::spec::Samples::Adaptive;
         let mut plan = scenes::plan(&mesh, &spec);
         let is_fixed = plan.warnings.iter().any(|warning| warning.code == "samples_fixed");
         let is_many = is_fixed || plan.peeling.is_some();
@@ -388,7 +388,7 @@ fn shared_edges_have_each_point_once() {
     (plan.is_adaptive, plan.margin_px, plan.background) = (true, 8, [0.0; 4]);
     // Of two colours, so that its spokes are mixed.
     let surface = plan.surface.as_mut().unwrap();
-    surface.materials.push(meshsnap::plan::ShadedMaterial::unlit([0.1, 0.1, 0.1, 1.0]));
+    surface.materials.push(meshsnap_render::plan::ShadedMaterial::unlit([0.1, 0.1, 0.1, 1.0]));
     surface.triangle_materials = (0..40).map(|i| i % 2).collect::<Vec<u32>>().into();
     let mut renderer = CpuRenderer::new(1);
     let image = draw(&mut renderer, &plan);

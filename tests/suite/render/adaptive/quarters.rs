@@ -1,10 +1,10 @@
 //! Metals that mirror sharply are shaded in each quarter of a pixel, the same on both back-ends and however they are drawn.
 
 use image::ImageFormat;
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::{CpuRenderer, Isa};
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::mesh::Mesh;
 use serde_json::json;
 
 use super::{draw, last_of_each};

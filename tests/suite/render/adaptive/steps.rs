@@ -1,8 +1,8 @@
 //! The pixels that an edge between two faces makes mixed: by how much the faces' normals differ, and by where the edge
 //! lies between the samples.
 
-use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, ShadedMaterial, flags};
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::{DrawPlan, ShadedMaterial, flags};
 
 use super::every_renderer;
 use crate::support::scenes;

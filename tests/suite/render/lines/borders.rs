@@ -3,16 +3,16 @@
 
 use std::sync::Arc;
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::{DrawPlan, SkipKind};
-use meshsnap::spec::WireThickness::Given;
-use meshsnap::spec::color::Rgba;
-use meshsnap::spec::{Hidden, Outline, OutlineMethod, OutlineUnit, Spec};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::{DrawPlan, SkipKind};
+use meshsnap_render::spec::WireThickness::Given;
+use meshsnap_render::spec::color::Rgba;
+use meshsnap_render::spec::{Hidden, Outline, OutlineMethod, OutlineUnit, Spec};
 
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};

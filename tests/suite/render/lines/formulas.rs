@@ -1,12 +1,12 @@
 //! Wires on a single triangle against their formulas, written down once more in f64; and derivative
 //! normals against those of the faces.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, ShadedMaterial, flags};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::{DrawPlan, ShadedMaterial, flags};
 
 use crate::support::gpus::gpus;
 use crate::support::{scenes, shapes};

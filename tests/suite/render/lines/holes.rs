@@ -1,13 +1,13 @@
 //! Lines whose coverage holes in faces tell: against the same lines as strokes alone, on both
 //! back-ends. What the lines should be is the accuracy suite's to say.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::DrawPlan;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::DrawPlan;
 
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};

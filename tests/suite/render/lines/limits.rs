@@ -4,14 +4,14 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, Edge, LinePass, Shown};
-use meshsnap::spec::color::Rgba;
-use meshsnap::spec::{Hidden, Layers, Spec};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::{DrawPlan, Edge, LinePass, Shown};
+use meshsnap_render::spec::color::Rgba;
+use meshsnap_render::spec::{Hidden, Layers, Spec};
 
 use crate::http::answers::{FORM, form};
 use crate::support::gpus::gpus;

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::{Image, srgb8_thresholds};
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
-use meshsnap::spec::color::Rgba;
-use meshsnap::spec::{Hidden, Outline, OutlineMethod, OutlineUnit, Spec, WireEdges};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::{Image, srgb8_thresholds};
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::spec::color::Rgba;
+use meshsnap_render::spec::{Hidden, Outline, OutlineMethod, OutlineUnit, Spec, WireEdges};
 
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};

@@ -1,11 +1,11 @@
 //! Points: their width, their depth cue, and that both back-ends draw the same.
 
-use meshsnap::backend::Renderer as _;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::Renderer as _;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
 
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};

@@ -3,17 +3,17 @@
 
 use std::sync::Arc;
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::{LineOrPoint, Mesh};
-use meshsnap::plan;
-use meshsnap::plan::DrawPlan;
-use meshsnap::scene::Scene;
-use meshsnap::spec::Spec;
-use meshsnap::warning::Warning;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::{LineOrPoint, Mesh};
+use meshsnap_render::plan;
+use meshsnap_render::plan::DrawPlan;
+use meshsnap_render::scene::Scene;
+use meshsnap_render::spec::Spec;
+use meshsnap_render::warning::Warning;
 
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};

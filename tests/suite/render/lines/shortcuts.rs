@@ -1,9 +1,9 @@
 //! The shortcuts that lines take on the CPU change no byte: pictures drawn with them and without.
 
-use meshsnap::backend::Renderer as _;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::Renderer as _;
+use meshsnap_render::backend::cpu::{CpuRenderer, Isa};
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
 
 use crate::support::scenes::{self, SCENES};
 use crate::support::shapes;
@@ -49,7 +49,7 @@ fn the_shortcuts_of_lines_change_no_byte() {
     let mut plain = CpuRenderer::plain(2);
     let mut renderers = [CpuRenderer::new(1), CpuRenderer::new(3), CpuRenderer::with_isa(2, Isa::baseline())];
     let (mut cases, mut with_lines) = (0, 0);
-    let mut compare = |name: &str, mesh: &Mesh, spec: &meshsnap::spec::Spec| {
+    let mut compare = |name: &str, mesh: &Mesh, spec: &meshsnap_render::spec::Spec| {
         let plan = scenes::plan(mesh, spec);
         let want = plain.draw(&plan, &deadline).unwrap();
         for renderer in &mut renderers {

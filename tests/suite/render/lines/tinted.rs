@@ -3,12 +3,12 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::{Image, srgb8_thresholds};
-use meshsnap::limits::Deadline;
-use meshsnap::plan::{
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::{CpuRenderer, Isa};
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::{Image, srgb8_thresholds};
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::{
     DrawPlan, Edge, Faces, LinePass, PeelingPass, ShadedMaterial, Shown, SurfacePass, flags, pass_mask,
 };
 

@@ -1,12 +1,12 @@
 //! Gradients behind the mesh: each row is to the byte that of a picture whose background has the row's
 //! colour everywhere, under surfaces, lines, hulls and layers; and the back-ends agree.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::srgb8_thresholds;
-use meshsnap::limits::Deadline;
-use meshsnap::plan::DrawPlan;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::{CpuRenderer, Isa};
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::srgb8_thresholds;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::DrawPlan;
 
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};

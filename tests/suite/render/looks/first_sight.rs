@@ -6,11 +6,11 @@
 
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
 
 use crate::render::models::readable;
 use crate::support::{data, scenes};

@@ -1,11 +1,11 @@
 //! The ground's shadow: dark where the mesh stands, soft around it, no part of the mesh's own picture, and
 //! nothing from below; and the back-ends agree.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::{Deadline, Limits};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::{CpuRenderer, Isa};
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::{Deadline, Limits};
 
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};

@@ -1,12 +1,12 @@
 //! `surface.facing_opacity` and the style `xray`: alpha is the formula's of the angle between normal and
 //! ray, in every shading and projection, and the back-ends agree.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::plan::DrawPlan;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::{CpuRenderer, Isa};
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::DrawPlan;
 
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};

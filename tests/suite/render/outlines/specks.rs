@@ -3,12 +3,12 @@
 //!
 //! `cargo test --test suite -- first_sight outlines_specks --nocapture` prints the number of each mesh.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::Shown;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::Shown;
 
 use crate::render::models::readable;
 use crate::support::{data, scenes};

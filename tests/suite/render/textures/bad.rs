@@ -3,8 +3,8 @@
 
 use crate::support::work::within_bytes;
 use image::ImageFormat;
-use meshsnap::limits::Limits;
-use meshsnap::plan::{PlanError, SkipKind};
+use meshsnap_render::limits::Limits;
+use meshsnap_render::plan::{PlanError, SkipKind};
 
 use crate::render::textures::levels::{encode, error, model_of, noise, plan_of, textures, warning};
 use crate::support::files::mesh::Noise;

@@ -4,8 +4,8 @@ use crate::render::textures::levels::{model_of, textures, value, warning};
 use crate::support::data;
 use crate::support::files::mesh::Noise;
 use crate::support::work::within_bytes;
-use meshsnap::limits::{Deadline, Limits};
-use meshsnap::plan::PlanError;
+use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::plan::PlanError;
 
 /// Pictures of 40 x 40 texels that say of themselves what they are: BASIS over ETC1S, and BASIS
 /// over UASTC, in the same colours; and one that is not of Basis Universal.

@@ -4,8 +4,8 @@ use crate::render::textures::levels::{base, encode, model, model_of};
 use crate::support::files::mesh::Noise;
 use crate::support::scenes;
 use image::ImageFormat;
-use meshsnap::limits::{Deadline, Limits};
-use meshsnap::plan::{Projection, SkipKind, Texture};
+use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::plan::{Projection, SkipKind, Texture};
 
 /// Triangles of all shapes, from anywhere: no pixel samples a level that was left out.
 #[test]

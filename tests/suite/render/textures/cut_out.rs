@@ -1,11 +1,11 @@
 //! Cut-out textures seen from afar: as much is drawn as close up.
 
 use image::{DynamicImage, ImageFormat, Rgba, RgbaImage};
-use meshsnap::backend::Renderer as _;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::Renderer as _;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
 use serde_json::json;
 
 use crate::render::textures::levels::{encode, model};

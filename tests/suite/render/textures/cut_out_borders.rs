@@ -2,13 +2,13 @@
 //! of which nothing shows do not frame the picture.
 
 use image::{DynamicImage, ImageFormat, Rgba, RgbaImage};
-use meshsnap::backend::Renderer as _;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::{self, Prepared};
-use meshsnap::scene::Scene;
+use meshsnap_render::backend::Renderer as _;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::{self, Prepared};
+use meshsnap_render::scene::Scene;
 use serde_json::{Value, json};
 
 use crate::render::textures::levels::{encode, model};

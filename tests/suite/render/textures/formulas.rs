@@ -1,10 +1,10 @@
 //! Textures on a square that faces the viewer: what is where, which way up, and which way bumps go.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::plan::{
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::{
     CornerValues, DrawPlan, Lamp, Lights, ShadedMaterial, Texture, TextureUse, Textures, flags, slots,
 };
 
@@ -160,5 +160,5 @@ fn level(k: u32) -> u8 {
 }
 
 fn linear(byte: u8) -> f32 {
-    meshsnap::srgb::srgb_to_linear(f64::from(byte) / 255.0) as f32
+    meshsnap_render::srgb::srgb_to_linear(f64::from(byte) / 255.0) as f32
 }

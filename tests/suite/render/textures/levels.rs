@@ -6,9 +6,9 @@ use crate::render::textures::bad::{header, png, zlib};
 use crate::support::files::mesh::{Gltf, Noise, read};
 use crate::support::scenes;
 use image::{DynamicImage, ImageFormat};
-use meshsnap::limits::{Deadline, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::{DrawPlan, PlanError, SkipKind, TEXTURE_NONE, Texture, Textures, slots};
+use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::{DrawPlan, PlanError, SkipKind, TEXTURE_NONE, Texture, Textures, slots};
 use serde_json::{Value, json};
 
 /// Triangles with texture coordinates, and one material with one image that repeats.
@@ -259,7 +259,7 @@ fn materials_without_triangles_load_nothing() {
     broken.image = mesh.images.len() as u32;
     mesh.materials[0].base_texture = Some(broken);
     let mut image = mesh.images[0].clone();
-    image.content = meshsnap::mesh::material::ImageContent::Encoded(b"lost"[..].into());
+    image.content = meshsnap_render::mesh::material::ImageContent::Encoded(b"lost"[..].into());
     mesh.images.push(image);
     let surface = plan_of(&mesh, &[], &Limits::default()).unwrap().surface.unwrap();
     assert_eq!(surface.materials.len(), 2);

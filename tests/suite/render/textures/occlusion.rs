@@ -1,12 +1,12 @@
 //! Occlusion textures: they take ambient light away by the formula, and nothing else.
 
 use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
-use meshsnap::backend::Renderer as _;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::{Image, srgb8_thresholds};
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::Renderer as _;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::{Image, srgb8_thresholds};
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
 use serde_json::{Value, json};
 
 use crate::render::textures::levels::{encode, model};

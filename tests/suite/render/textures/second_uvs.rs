@@ -1,11 +1,11 @@
 //! Textures of one material that follow different sets of texture coordinates.
 
 use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
-use meshsnap::backend::Renderer as _;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
+use meshsnap_render::backend::Renderer as _;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
 use serde_json::{Value, json};
 
 use crate::render::textures::levels::encode;

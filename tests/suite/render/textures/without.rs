@@ -1,12 +1,12 @@
 //! Pictures that have to go without a texture: they are drawn, with a warning.
 
 use image::{ImageFormat, RgbImage};
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::mesh::material::ImageContent;
-use meshsnap::plan::{self, Prepared, ShadedMaterial, TEXTURE_NONE};
-use meshsnap::scene::Scene;
-use meshsnap::warning::Warning;
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::mesh::material::ImageContent;
+use meshsnap_render::plan::{self, Prepared, ShadedMaterial, TEXTURE_NONE};
+use meshsnap_render::scene::Scene;
+use meshsnap_render::warning::Warning;
 use serde_json::{Value, json};
 
 use crate::render::textures::bad::{header, png, zlib};

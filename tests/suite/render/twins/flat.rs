@@ -3,13 +3,13 @@
 
 use std::collections::HashSet;
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::{Projection, ShadedMaterial, flags};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::{Projection, ShadedMaterial, flags};
 
 use crate::support::gpus::gpus;
 use crate::support::shapes::{self, Random};

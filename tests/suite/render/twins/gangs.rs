@@ -3,12 +3,12 @@
 use std::sync::Arc;
 use std::thread;
 
-use meshsnap::backend::Renderer as _;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::{self, DrawPlan, Prepared};
-use meshsnap::scene::Scene;
+use meshsnap_render::backend::Renderer as _;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::{self, DrawPlan, Prepared};
+use meshsnap_render::scene::Scene;
 
 use crate::support::gpus::gpus;
 use crate::support::{scenes, shapes};

@@ -1,10 +1,10 @@
 //! GPU against CPU: pictures that agree, within named tolerances, and workers that share a device.
 
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::backend::{DrawError, Renderer};
-use meshsnap::limits::Deadline;
-use meshsnap::plan::ShadedMaterial;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::backend::{DrawError, Renderer};
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::ShadedMaterial;
 
 use crate::render::golden;
 use crate::support::gpus::gpus;

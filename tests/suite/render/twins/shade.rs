@@ -2,13 +2,15 @@
 
 use std::borrow::Cow;
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
-use meshsnap::plan::{CornerValues, DrawPlan, ShadedMaterial, Texture, TextureUse, Textures, flags, samplers, slots};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::{CpuRenderer, Isa};
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::plan::{
+    CornerValues, DrawPlan, ShadedMaterial, Texture, TextureUse, Textures, flags, samplers, slots,
+};
 
 use crate::support::gpus;
 use crate::support::likeness::{Likeness, Tolerance};

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use meshsnap::backend::Renderer as _;
-use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
-use meshsnap::image::Image;
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::plan;
-use meshsnap::scene::Scene;
+use meshsnap_render::backend::Renderer as _;
+use meshsnap_render::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::plan;
+use meshsnap_render::scene::Scene;
 
 use crate::support::gpus::gpus;
 use crate::support::{scenes, shapes};

@@ -1,11 +1,11 @@
 //! GPU against CPU: the same visibility buffer, word for word, on random triangle soups; and a
 //! brute-force third opinion.
 
-use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, Faces, sample_offsets};
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::backend::gpu::GpuRenderer;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::plan::{DrawPlan, Faces, sample_offsets};
 
 use crate::support::families::soups::{KINDS, Kind, Random, Soup, View};
 use crate::support::gpus::gpus;

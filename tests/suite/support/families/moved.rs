@@ -1,10 +1,10 @@
 //! Meshes for the stress tests: meshes as lists that can be moved, scaled and shuffled, and the
 //! looks they are drawn in.
 
-use meshsnap::backend::Renderer;
-use meshsnap::image::Image;
-use meshsnap::limits::Deadline;
-use meshsnap::mesh::Mesh;
+use meshsnap_render::backend::Renderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
+use meshsnap_render::mesh::Mesh;
 
 use crate::oracle::obj::Shape;
 use crate::oracle::vector::V3;

@@ -1,6 +1,6 @@
 //! Random triangles to disagree about, and how they are looked at.
 
-use meshsnap::plan::{DrawPlan, Faces, HullPass, HullVertex, Projection, ShadedMaterial, SurfacePass};
+use meshsnap_render::plan::{DrawPlan, Faces, HullPass, HullVertex, Projection, ShadedMaterial, SurfacePass};
 
 /// xorshift64*: the tests must draw the same soups everywhere.
 pub struct Random(pub u64);

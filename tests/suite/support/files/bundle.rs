@@ -5,8 +5,8 @@ use crate::support::files::mesh::Read;
 use std::io::{Cursor, Write as _};
 
 use crate::support::data;
-use meshsnap::import::{Bundle, BundleFile, MeshError, import};
-use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap_render::import::{Bundle, BundleFile, MeshError, import};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
 
 /// Files under names that must be good.
 pub fn files(files: &[(&str, &[u8])]) -> Vec<BundleFile> {

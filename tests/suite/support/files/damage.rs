@@ -1,7 +1,7 @@
 //! Files cut off anywhere and changed at random: no reader panics over them or allocates much.
 
 use crate::support::files::mesh::{Noise, read_as};
-use meshsnap::import::{Format, MeshFault};
+use meshsnap_render::import::{Format, MeshFault};
 
 use crate::support::work::{allocated_bytes, within_bytes};
 

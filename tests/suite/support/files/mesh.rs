@@ -2,9 +2,9 @@
 //! comes out.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
-use meshsnap::import::{Bundle, Format, ImportReport, Imported, MeshError, Options, import};
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::Mesh;
+use meshsnap_render::import::{Bundle, Format, ImportReport, Imported, MeshError, Options, import};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
 use serde_json::{Value, json};
 use std::ops::{Deref, DerefMut};
 

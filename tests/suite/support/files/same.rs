@@ -1,9 +1,9 @@
 //! Meshes compared.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
-use meshsnap::limits::{Budget, Limits};
-use meshsnap::mesh::Mesh;
-use meshsnap::mesh::edges::EdgeList;
+use meshsnap_render::limits::{Budget, Limits};
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::mesh::edges::EdgeList;
 
 /// The edge list, with default limits.
 pub fn edges(mesh: &Mesh) -> EdgeList {

@@ -1,0 +1,12 @@
+//! What meshsnap says about meshes: [`report`]s on one, [`check`]s by rules, and the [`diff`]erence of two.
+//!
+//! [`opened`] has the files that are judged or compared, and the pictures of what was found. [`geometry`] answers questions
+//! that drawing does not ask.
+
+pub mod check;
+pub mod diff;
+pub mod geometry;
+#[cfg(test)]
+mod made_obj;
+pub mod opened;
+pub mod report;

@@ -1,0 +1,280 @@
+//! Files that were read to be judged or compared, and the pictures of what was found.
+
+use crate::check::{self, Check, Place, RuleSet};
+use crate::diff::{self, Compared};
+use meshsnap_render::backend::Backends;
+use meshsnap_render::caption::{Mark, Scale, draw_legend, draw_marks};
+use meshsnap_render::encode;
+use meshsnap_render::image::{Image, ImageFormat};
+use meshsnap_render::import::{self, Bundle, Imported, MeshError};
+use meshsnap_render::limits::{Budget, Deadline, LimitExceeded, Limits};
+use meshsnap_render::mesh::Mesh;
+use meshsnap_render::pipeline::{Drawn, Output, PlanError, RenderError, Stage, View, draw_view};
+use meshsnap_render::plan::{self, Prepared};
+use meshsnap_render::scene::Scene;
+use meshsnap_render::sheet::{self, Canvas, Layout};
+use meshsnap_render::spec::{CameraSpec, Sheet, SheetViews, Spec};
+
+/// A file that was read, to be judged or compared.
+pub struct Opened {
+    imported: Imported,
+    prepared: Prepared,
+    budget: Budget,
+    file_bytes: u64,
+}
+
+/// Reads a file, to judge it or to compare it.
+pub fn open(
+    bundle: &Bundle,
+    options: impl Into<import::Options>,
+    limits: &Limits,
+    deadline: &Deadline,
+) -> Result<Opened, MeshError> {
+    let mut budget = Budget::new(limits);
+    let options = import::Options { counts_loose: true, ..options.into() };
+    let imported = import::import(bundle, options, limits, &mut budget, deadline)?;
+    Ok(Opened { imported, prepared: Prepared::default(), budget, file_bytes: bundle.bytes_len() })
+}
+
+impl Opened {
+    /// The path of the mesh in its bundle.
+    pub fn path(&self) -> &str {
+        &self.imported.path
+    }
+
+    /// Judges the file by rules. Fails where the time of the job ends, and by its memory unless rules are to tell that.
+    pub fn check(
+        &self,
+        rules: &RuleSet,
+        options: check::Options,
+        deadline: &Deadline,
+    ) -> Result<Vec<Check>, MeshError> {
+        let Imported { mesh, report, .. } = &self.imported;
+        let subject = check::Subject { mesh, import: report, file_bytes: self.file_bytes };
+        check::check(&subject, rules, options, &mut self.budget.clone(), deadline)
+    }
+
+    /// Compares the file with another, which is the newer one. `max_distance` is the largest distance between the
+    /// surfaces that counts as the same; None: what encodings round away.
+    pub fn diff(&self, other: &Self, max_distance: Option<f64>, deadline: &Deadline) -> Result<Compared, MeshError> {
+        let mut budget = self.budget_beside(other)?;
+        let [a, b] =
+            [&self.imported, &other.imported].map(|Imported { mesh, report, .. }| diff::Side { mesh, import: report });
+        diff::compare(a, b, max_distance, &mut budget, deadline)
+    }
+
+    /// Draws the file. If it is to be compared, the camera is fitted to what is `beside` it, too.
+    pub fn draw(
+        &self,
+        beside: Option<&Self>,
+        spec: &Spec,
+        backends: &mut Backends,
+        deadline: &Deadline,
+    ) -> Result<Image, RenderError> {
+        let mut budget = self.budget_of(beside)?;
+        let framing = self.framing_with(beside, &mut budget)?;
+        let view = self.view(framing.as_deref());
+        Ok(draw_view(view, spec, None, backends, &mut budget, deadline, &mut |_| ())?.image)
+    }
+
+    /// A request whose camera takes this file's word for what is up.
+    pub fn with_up(&self, spec: &Spec) -> Spec {
+        let up = Some(spec.camera.up.unwrap_or(self.imported.mesh.up));
+        Spec { camera: CameraSpec { up, ..spec.camera }, ..spec.clone() }
+    }
+
+    /// Marks places of faults in a picture of the file, drawn with the same file beside it. Those that are hidden are
+    /// marked, too.
+    pub fn mark(
+        &self,
+        image: &mut Image,
+        beside: Option<&Self>,
+        spec: &Spec,
+        places: &[Place],
+        deadline: &Deadline,
+    ) -> Result<(), RenderError> {
+        let (mesh, mut budget) = (&self.imported.mesh, self.budget_of(beside)?);
+        let framing = match self.framing_with(beside, &mut budget)? {
+            None => plan::framing(mesh, spec, &self.prepared, &mut budget, deadline)?,
+            framing => framing,
+        };
+        let scene = Scene::framed_by(framing.as_deref().unwrap_or(&mesh.positions), mesh, spec, &mut budget)?;
+        mark_places(image, &scene, places);
+        Ok(())
+    }
+
+    fn view<'a>(&'a self, framing: Option<&'a [[f32; 3]]>) -> View<'a> {
+        View { mesh: &self.imported.mesh, prepared: &self.prepared, framing }
+    }
+
+    /// The places to which a camera is fitted that shows this file and another. None: there is no other.
+    fn framing_with(&self, beside: Option<&Self>, budget: &mut Budget) -> Result<Option<Vec<[f32; 3]>>, MeshError> {
+        Ok(beside.map(|other| diff::framing(&self.imported.mesh, &other.imported.mesh, budget)).transpose()?)
+    }
+
+    /// The memory that is left beside the file, and beside another if there is one.
+    fn budget_of(&self, beside: Option<&Self>) -> Result<Budget, MeshError> {
+        beside.map_or_else(|| Ok(self.budget.clone()), |other| self.budget_beside(other))
+    }
+
+    /// The memory that is left beside both files.
+    fn budget_beside(&self, other: &Self) -> Result<Budget, MeshError> {
+        let mut budget = self.budget.clone();
+        budget.spend("the other mesh", other.budget.spent_bytes(), 1)?;
+        Ok(budget)
+    }
+}
+
+/// Marks places in a picture of a scene.
+fn mark_places(image: &mut Image, scene: &Scene<'_, '_>, places: &[Place]) {
+    let rows = scene.camera.rows([image.width_px, image.height_px]);
+    let middle = [f64::from(image.width_px) / 2.0, f64::from(image.height_px) / 2.0];
+    let near = scene.camera.near;
+    let on_image = |position: &[f64; 3]| -> Option<[f64; 2]> {
+        let to_file = &scene.mesh.to_file;
+        let at: [f64; 3] = std::array::from_fn(|k| (position[k] - to_file.centre[k]) / to_file.scale);
+        let [x, y, _, w] = rows.map(|row| (0..3).map(|k| f64::from(row[k]) * at[k]).sum::<f64>() + f64::from(row[3]));
+        // Beyond the eye nothing is seen.
+        (w > near.min(1e-3) && w.is_finite()).then(|| [middle[0] + x / (256.0 * w), middle[1] + y / (256.0 * w)])
+    };
+    let marks: Vec<Mark> = places.iter().filter_map(|place| mark(place, on_image)).flatten().collect();
+    draw_marks(image, &marks);
+}
+
+/// The marks of a place. None if a part of it is beyond the eye.
+fn mark(place: &Place, on_image: impl Fn(&[f64; 3]) -> Option<[f64; 2]>) -> Option<Vec<Mark>> {
+    Some(match place {
+        Place::Vertex(at) => vec![Mark::Dot(on_image(at)?)],
+        Place::Edge([a, b]) => vec![Mark::Line([on_image(a)?, on_image(b)?])],
+        Place::Face([a, b, c]) => {
+            let [a, b, c] = [on_image(a)?, on_image(b)?, on_image(c)?];
+            vec![Mark::Line([a, b]), Mark::Line([b, c]), Mark::Line([c, a])]
+        }
+    })
+}
+
+/// A picture of one of two meshes that were compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The older mesh as it looks.
+    Before,
+    /// The newer one as it looks.
+    After,
+    /// The older one in the colours of its distance from the newer one.
+    HeatBefore,
+    /// The newer one in the colours of its distance from the older one.
+    HeatAfter,
+}
+
+impl Side {
+    /// The number of the mesh.
+    fn index(self) -> usize {
+        usize::from(matches!(self, Self::After | Self::HeatAfter))
+    }
+
+    /// True if the colours are those of distances.
+    fn has_colors(self) -> bool {
+        matches!(self, Self::HeatBefore | Self::HeatAfter)
+    }
+
+    fn label(self) -> &'static str {
+        ["before", "after"][self.index()]
+    }
+}
+
+/// Draws pictures of two meshes that were compared beside each other, all through one camera that is fitted to both.
+/// `spec` is the request of the pictures in colours of distances, `plain` that of the others, and says its size.
+pub fn draw_difference(
+    opened: [&Opened; 2],
+    compared: &Compared,
+    sides: &[Side],
+    spec: &Spec,
+    plain: &Spec,
+    backends: &mut Backends,
+    deadline: &Deadline,
+) -> Result<Drawn, RenderError> {
+    let budget = &mut opened[0].budget_beside(opened[1])?;
+    let meshes = opened.map(|opened| &opened.imported.mesh);
+    let all = compared.of_vertices.iter().flatten();
+    let most = all.copied().filter(|distance| distance.is_finite()).fold(0.0, f64::max);
+    // The newer mesh says what is up, so that the camera is one.
+    let spec = opened[1].with_up(spec);
+    let camera = CameraSpec { up: spec.camera.up, ..plain.camera };
+    let plain = Spec { image: spec.image, camera, ..plain.clone() };
+    let views = SheetViews::Named(vec![spec.camera.view; sides.len()]);
+    let sheet = Sheet { views, columns: Some(sides.len() as u32), labels: false };
+    let layout = Layout::new(&sheet, &spec.image, false);
+    let mut canvas = Canvas::new(layout, budget).map_err(PlanError::Limit)?;
+    let mut all: Option<Drawn> = None;
+    for (cell, &side) in layout.cells().zip(sides).filter(|(cell, _)| !cell.size_px.contains(&0)) {
+        // The memory of a side is free again before the next.
+        let mut of_cell = budget.clone();
+        let limit = |error| RenderError::from(PlanError::Limit(error));
+        let index = side.index();
+        let framing = diff::framing(meshes[index], meshes[1 - index], &mut of_cell).map_err(limit)?;
+        let mut drawn = match side {
+            Side::Before | Side::After => {
+                let of_view = sheet::cell_spec(&plain, &sheet, &cell);
+                let view = opened[index].view(Some(&framing));
+                draw_view(view, &of_view, None, backends, &mut of_cell, deadline, &mut |_| ())?
+            }
+            Side::HeatBefore | Side::HeatAfter => {
+                let mesh = heat(meshes[index], compared, index, most, &mut of_cell).map_err(limit)?;
+                let of_view = sheet::cell_spec(&spec, &sheet, &cell);
+                let view = View { mesh: &mesh, prepared: &Prepared::default(), framing: Some(&framing) };
+                draw_view(view, &of_view, None, backends, &mut of_cell, deadline, &mut |_| ())?
+            }
+        };
+        if let (true, Some(place)) = (side.has_colors(), compared.hidden_place(index)) {
+            let of_view = sheet::cell_spec(&spec, &sheet, &cell);
+            let scene = Scene::framed_by(&framing, meshes[index], &of_view, &mut of_cell)?;
+            mark_places(&mut drawn.image, &scene, &[Place::Vertex(place)]);
+        }
+        canvas.paste(&cell, &drawn.image);
+        // One side in colours stands beside pictures of both.
+        match sides {
+            [Side::HeatBefore] => canvas.write(&cell, "before: distance"),
+            [Side::HeatAfter] => canvas.write(&cell, "after: distance"),
+            _ => canvas.write(&cell, side.label()),
+        }
+        match &mut all {
+            Some(all) => all.add(drawn),
+            None => all = Some(drawn),
+        }
+    }
+    let mut all = match all {
+        Some(all) => all,
+        // A picture of one pixel has no room for several sides.
+        None => draw_view(opened[1].view(None), &plain, None, backends, budget, deadline, &mut |_| ())?,
+    };
+    all.image = canvas.finish();
+    // Where no vertex has a distance, there is one colour.
+    if most > 0.0 && sides.iter().any(|side| side.has_colors()) {
+        let plan::Legend { title, ends, colors } = diff::legend(most);
+        draw_legend(&mut all.image, &[Scale { title, ends, colors: &colors }]);
+    }
+    Ok(all)
+}
+
+fn heat(mesh: &Mesh, compared: &Compared, side: usize, most: f64, budget: &mut Budget) -> Result<Mesh, LimitExceeded> {
+    diff::painted(mesh, &compared.of_vertices[side], most, budget)
+}
+
+/// Both sides in the colours of their distance, as the bytes of a picture.
+pub fn render_difference(
+    opened: [&Opened; 2],
+    compared: &Compared,
+    spec: &Spec,
+    backends: &mut Backends,
+    deadline: &Deadline,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<Output, RenderError> {
+    let sides = [Side::HeatBefore, Side::HeatAfter];
+    let drawn = draw_difference(opened, compared, &sides, spec, spec, backends, deadline)?;
+    ended(Stage::Render);
+    let format = spec.image.format.unwrap_or(ImageFormat::Png);
+    let bytes = encode::encode(&drawn.image, format, spec.image.effort, deadline)?;
+    ended(Stage::Encode);
+    let Drawn { backend, is_substitute, draw_times, skips, short_chains, warnings, selection, .. } = drawn;
+    Ok(Output { bytes, format, backend, is_substitute, draw_times, skips, short_chains, warnings, selection })
+}

@@ -1,0 +1,184 @@
+//! `meshsnap jobs`: lists the jobs in a data folder, also while a server uses it.
+
+use std::fmt::Write as _;
+use std::io::ErrorKind;
+use std::path::PathBuf;
+
+use clap::{Args, ValueHint};
+use serde::Serialize;
+
+use super::files;
+use crate::error::CliError;
+use meshsnap_server::config;
+use meshsnap_server::durable::{self, ErrorRecord, OpenError, RecoveredJob, RequestKind};
+use meshsnap_server::jobs::{JobId, rfc_3339};
+
+/// Examples at the end of `--help`.
+pub const EXAMPLES: &str = "\
+Examples:
+  meshsnap jobs
+  meshsnap jobs --dead --data-dir /var/lib/meshsnap
+  meshsnap jobs --jsonl | jq -r .id";
+
+/// Arguments of `jobs`.
+#[derive(Args)]
+pub struct JobsArgs {
+    /// Folder of the server [default: that of `serve` without a --config]
+    #[arg(long, value_name = "DIR", env = "MESHSNAP_DATA_DIR", value_hint = ValueHint::DirPath)]
+    data_dir: Option<PathBuf>,
+    /// Only jobs that have failed
+    #[arg(long)]
+    dead: bool,
+    /// Print a line of JSON for each job
+    #[arg(long)]
+    jsonl: bool,
+}
+
+/// A job in a line of JSON. What the state of a job over HTTP has, too, has the same name there.
+#[derive(Serialize)]
+struct JobLine<'a> {
+    id: String,
+    /// As over HTTP, but a job that was begun is `running`, also if its server has crashed.
+    state: &'static str,
+    kind: RequestKind,
+    accepted_unix_ms: u64,
+    accepted_at: String,
+    /// Times that a worker has begun it.
+    starts: u32,
+    owner: &'a str,
+    request_id: &'a str,
+    /// The names of its mesh's files.
+    files: Vec<&'a str>,
+    /// The stored mesh that it is about, by its SHA-256.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mesh: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ended_unix_ms: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fetched_unix_ms: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    result: Option<ResultLine<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<&'a ErrorRecord>,
+}
+
+/// The result of a job that is done.
+#[derive(Serialize)]
+struct ResultLine<'a> {
+    sha256: String,
+    format: &'a str,
+    backend: &'a str,
+    /// A verdict whose request wanted 422 for it.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    has_failed: bool,
+}
+
+/// Prints the jobs, the oldest first.
+pub fn run(arguments: &JobsArgs) -> Result<(), CliError> {
+    let given = arguments.data_dir.clone().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = given.or_else(config::default_data_dir);
+    let folder = folder.ok_or_else(|| CliError::usage("there is no home folder: say --data-dir DIR"))?;
+    let contents = durable::read(&folder).map_err(|error| match error {
+        OpenError::Io { error, .. } if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+            let folder = folder.display();
+            CliError::usage(format!("{folder} is no data folder of meshsnap: name the one of `serve` with --data-dir"))
+        }
+        OpenError::Io { error, .. } if error.kind() == ErrorKind::ResourceBusy => CliError::ours(format!(
+            "the data folder {} is written to without a pause, so that no copy of its log is of one state: try again",
+            folder.display()
+        )),
+        OpenError::Io { error, .. } => {
+            CliError::ours(format!("the data folder {} cannot be read: {error}", folder.display()))
+        }
+        error => CliError::usage(error.to_string()),
+    })?;
+    let jobs: Vec<JobLine> = contents.jobs.iter().map(JobLine::new).collect();
+    let shown = jobs.iter().filter(|job| !arguments.dead || job.state == FAILED);
+    let mut text = String::new();
+    for job in shown {
+        if arguments.jsonl {
+            text += &serde_json::to_string(job).map_err(|error| CliError::ours(error.to_string()))?;
+            text.push('\n');
+        } else {
+            job.print(&mut text);
+        }
+    }
+    if !arguments.jsonl {
+        text += &format!("{} in {}\n", summary(&jobs, contents.meshes.len()), folder.display());
+    }
+    files::print(text.as_bytes())
+}
+
+const FAILED: &str = "failed";
+
+/// The states in the order of a job's life.
+const STATES: [&str; 5] = ["queued", "running", "done", FAILED, "cancelled"];
+
+fn state_of(job: &RecoveredJob) -> &'static str {
+    match &job.end {
+        None if job.starts == 0 => "queued",
+        None => "running",
+        Some(end) if end.error.is_some() => FAILED,
+        Some(end) if end.picture.is_some() => "done",
+        Some(_) => "cancelled",
+    }
+}
+
+impl<'a> JobLine<'a> {
+    fn new(job: &'a RecoveredJob) -> Self {
+        let (record, end) = (&job.record, job.end.as_ref());
+        let picture = end.and_then(|end| end.picture.as_ref());
+        Self {
+            id: JobId::from_key(record.key).to_string(),
+            state: state_of(job),
+            kind: record.request.kind,
+            accepted_unix_ms: record.accepted_unix_ms,
+            accepted_at: rfc_3339(record.accepted_unix_ms),
+            starts: job.starts,
+            owner: &record.owner,
+            request_id: &record.request_id,
+            files: record.files.iter().map(|file| file.path.as_str()).collect(),
+            mesh: record.mesh.map(|mesh| mesh.to_string()),
+            ended_unix_ms: end.map(|end| end.at_unix_ms),
+            fetched_unix_ms: end.and_then(|end| end.fetched_unix_ms),
+            result: picture.map(|picture| ResultLine {
+                sha256: picture.digest.to_string(),
+                format: &picture.format,
+                backend: &picture.backend,
+                has_failed: picture.has_failed,
+            }),
+            error: end.and_then(|end| end.error.as_ref()),
+        }
+    }
+
+    fn print(&self, text: &mut String) {
+        let kind = match self.kind {
+            RequestKind::Draw => "draw",
+            RequestKind::Check => "check",
+            RequestKind::Diff => "diff",
+        };
+        let _ = write!(text, "{}  {:<9}  {}  {kind:<5}", self.id, self.state, self.accepted_at);
+        if let Some(error) = self.error {
+            let _ = write!(text, "  {}: ", error.code);
+            // Names from the client's file are in it.
+            text.extend(error.detail.chars().map(|c| if c.is_control() { '\u{FFFD}' } else { c }));
+        } else if let Some(result) = &self.result {
+            let verdict = if result.has_failed { ", failed" } else { "" };
+            let is_fetched = if self.fetched_unix_ms.is_some() { ", fetched" } else { "" };
+            let _ = write!(text, "  {}{verdict}{is_fetched}", result.format);
+        } else if self.starts > 1 {
+            let _ = write!(text, "  begun {} times", self.starts);
+        }
+        text.push('\n');
+    }
+}
+
+/// The start of the last line: numbers of jobs, by state, and of meshes.
+fn summary(jobs: &[JobLine], meshes: usize) -> String {
+    let count = |state| jobs.iter().filter(|job| job.state == state).count();
+    let counts = STATES.iter().map(|state| (count(*state), state)).filter(|(count, _)| *count > 0);
+    let counts: Vec<String> = counts.map(|(count, state)| format!("{count} {state}")).collect();
+    let of_states = if counts.is_empty() { String::new() } else { format!(" ({})", counts.join(", ")) };
+    let plural = |count: usize, one: &str, many: &str| format!("{count} {}", if count == 1 { one } else { many });
+    format!("{}{of_states}, {}", plural(jobs.len(), "job", "jobs"), plural(meshes, "stored mesh", "stored meshes"))
+}

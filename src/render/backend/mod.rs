@@ -1,0 +1,109 @@
+//! Two ways to fill a [`DrawPlan`]: [`cpu`] and [`gpu`], with the same stages in the same order:
+//! transform -> visibility -> shade -> lines -> resolve.
+//!
+//! Each stage is written twice, in twins of the same name: `shaders/ROOM/NAME.wgsl` and
+//! `src/render/backend/cpu/ROOM/NAME.rs`. The module's tests hold the constants, structs and bindings that
+//! the two share. `select` chooses a back-end per job, by `costs` where both could draw it; `host`
+//! owns the process's GPU, and [`probe`] checks a GPU before it is used.
+//!
+//! **Invariant:** nothing here imports a mesh or a scene, and the two back-ends do not import each
+//! other.
+
+mod costs;
+pub mod cpu;
+mod device;
+mod draw_times;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+mod host;
+pub mod probe;
+mod recovery;
+pub(crate) mod sample_partition;
+mod select;
+
+pub use costs::CostModel;
+pub use device::{GpuDevice, GpuInfo, GpuKind, GpuState, GpuStatus, HardwareHint, Opener};
+pub use draw_times::{DrawStage, DrawTimes};
+pub use host::GpuHost;
+pub use select::{Backends, Chosen};
+
+use crate::image::{Image, RowSink};
+use crate::limits::{Deadline, Stopped};
+use crate::plan::DrawPlan;
+
+/// Draws plans. A worker owns one; it keeps its buffers from job to job.
+pub trait Renderer {
+    /// Fills the plan's picture.
+    fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError>;
+
+    /// As [`Renderer::draw`], and gives rows to `sink` as soon as they and those above them are done: all rows, or
+    /// none where the back-end finishes a picture at once.
+    fn draw_rows(
+        &mut self,
+        plan: &DrawPlan<'_>,
+        sink: &mut dyn RowSink,
+        deadline: &Deadline,
+    ) -> Result<Image, DrawError> {
+        let _ = sink;
+        self.draw(plan, deadline)
+    }
+
+    /// Fills the visibility buffer alone, for tests that compare back-ends sample for sample.
+    ///
+    /// One word a sample at `(y * width + x) * samples + s`: depth bits in the upper half, the
+    /// complement of the triangle id in the lower (so that of equal depths the lowest id wins), 0
+    /// where there is nothing.
+    fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError>;
+
+    /// The durations of the last picture's stages, as far as this back-end times them.
+    fn draw_times(&self) -> DrawTimes {
+        DrawTimes::default()
+    }
+
+    /// `cpu` or `gpu`.
+    fn kind(&self) -> BackendKind;
+}
+
+/// A back-end, as reports name it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BackendKind {
+    /// Our own rasterizer.
+    Cpu,
+    /// wgpu.
+    Gpu,
+}
+
+impl BackendKind {
+    /// The word used in headers and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cpu => "cpu",
+            Self::Gpu => "gpu",
+        }
+    }
+}
+
+/// Errors of drawing a plan. Never the client's fault, except for an exceeded deadline.
+#[derive(Debug, thiserror::Error)]
+pub enum DrawError {
+    /// The deadline has passed.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+    /// There is no GPU here to draw on.
+    #[error("there is no GPU to draw on: {0}")]
+    NoGpu(String),
+    /// The device is lost; a new one may work.
+    #[error("the GPU was lost: {0}")]
+    DeviceLost(String),
+    /// The plan is beyond the device's limits; trying again is of no use.
+    #[error("the GPU cannot draw this: {0}")]
+    BeyondGpu(String),
+    /// The device refused the work, perhaps for lack of memory.
+    #[error("the GPU cannot draw this: {0}")]
+    Device(String),
+}
+
+// These tests compare constants, structs and bindings with the shaders.
+#[cfg(test)]
+#[cfg(feature = "gpu")]
+mod tests;

@@ -1,0 +1,77 @@
+//! Size, format, sampling and background of the picture, as a request describes them.
+
+use super::background::Background;
+use super::color::Rgba;
+pub use crate::image::ImageFormat;
+
+/// The picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImageSpec {
+    /// Columns.
+    pub width_px: u32,
+    /// Rows.
+    pub height_px: u32,
+    /// None: the caller decides, by file extension or Accept header, and else takes PNG.
+    pub format: Option<ImageFormat>,
+    /// Visibility samples per pixel.
+    pub samples: Samples,
+    /// What is behind the mesh; alpha 0 is transparent.
+    pub background: Background,
+    /// Time that is spent to make a PNG small, from 0 to 9. Other formats ignore it.
+    pub effort: u32,
+    /// Tells in the picture what the colours of its diagnostics mean.
+    pub legend: bool,
+}
+
+/// Visibility samples per pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Samples {
+    /// 1, 4, 8 or 16.
+    Fixed(u32),
+    /// 4, or 16 in pictures with something transparent, and points in pixels that show several faces.
+    Adaptive,
+}
+
+impl Samples {
+    /// The numbers that a request may ask for.
+    pub const FIXED: &'static [u32] = &[1, 4, 8, 16];
+
+    /// Samples in every pixel, where adaptive ones are asked for, of pictures with something transparent or without
+    /// surfaces.
+    pub const LAYERED: u32 = 16;
+
+    /// Samples in every pixel of a picture in which nothing is transparent.
+    pub fn per_pixel(self) -> u32 {
+        match self {
+            Self::Fixed(samples) => samples,
+            Self::Adaptive => 4,
+        }
+    }
+}
+
+/// The value of `image.samples`.
+impl std::fmt::Display for Samples {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Fixed(samples) => samples.fmt(f),
+            Self::Adaptive => f.write_str(ADAPTIVE),
+        }
+    }
+}
+
+/// The word for [`Samples::Adaptive`].
+pub const ADAPTIVE: &str = "adaptive";
+
+impl Default for ImageSpec {
+    fn default() -> Self {
+        Self {
+            width_px: 512,
+            height_px: 512,
+            format: None,
+            samples: Samples::Fixed(4),
+            background: Rgba::WHITE.into(),
+            effort: crate::image::DEFAULT_EFFORT,
+            legend: false,
+        }
+    }
+}

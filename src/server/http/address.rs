@@ -1,0 +1,62 @@
+//! Addresses of pictures of stored meshes, and their tags.
+
+use super::state::AppState;
+use crate::digest::Digest;
+use crate::percent;
+use crate::store::Reading;
+use meshsnap_render::image::ImageFormat;
+use meshsnap_render::spec::{BackendChoice, Spec};
+
+/// Longest address that is given out: proxies and browsers may refuse longer ones.
+const URL_BYTES_MAX: usize = 2000;
+
+/// The address at which a picture can be fetched again.
+pub struct Address {
+    /// The URL, without a host.
+    pub url: String,
+    /// The picture's tag at this URL.
+    pub etag: String,
+}
+
+impl Address {
+    /// The address of a picture of a stored mesh. `keys` are the dotted keys of its request
+    /// document. None if the document does not name a format or the URL would be too long.
+    pub fn new(
+        state: &AppState,
+        digest: Digest,
+        reading: &Reading,
+        spec: &Spec,
+        keys: &[(String, String)],
+    ) -> Option<Self> {
+        let extension = match spec.image.format? {
+            ImageFormat::Png => "png",
+            ImageFormat::Webp => "webp",
+            ImageFormat::Jpeg => "jpg",
+        };
+        let format_in = reading.format_in.map(|format| ("format_in", format.name()));
+        let entry = reading.entry.as_deref().map(|entry| ("entry", entry));
+        let keys = keys.iter().map(|(key, text)| (key.as_str(), text.as_str())).chain(format_in).chain(entry);
+        let query: Vec<String> =
+            keys.map(|(key, text)| [key, text].map(|part| percent::encoded(part, b",:/")).join("=")).collect();
+        let mark = if query.is_empty() { "" } else { "?" };
+        let url = format!("/v1/meshes/{digest}/render.{extension}{mark}{}", query.join("&"));
+        (url.len() <= URL_BYTES_MAX).then(|| Self { url, etag: render_key(state, digest, reading, spec) })
+    }
+}
+
+/// The tag of a picture: a digest of all that decides it, so that it is known before anything is
+/// drawn. Requests with the same meaning have the same key, whatever their order or short names.
+///
+/// The CPU's bytes are the same on every machine, so its tag is strong. Two GPUs, or a GPU and the
+/// CPU that replaces it, may differ in the last place, so the tag is weak where a GPU may draw.
+pub fn render_key(state: &AppState, digest: Digest, reading: &Reading, spec: &Spec) -> String {
+    let may_be_gpu = match spec.backend {
+        BackendChoice::Cpu => false,
+        BackendChoice::Auto => state.gpu.may_have_hardware(),
+        BackendChoice::Gpu => true,
+    };
+    // Debug output is unambiguous: it has every field, exact numbers and quoted text.
+    let key = format!("{} {digest} {reading:?} {spec:?} {may_be_gpu}", env!("CARGO_PKG_VERSION"));
+    let weak = if may_be_gpu { "W/" } else { "" };
+    format!("{weak}\"{}\"", Digest::of(key.as_bytes()))
+}

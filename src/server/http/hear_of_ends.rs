@@ -1,0 +1,76 @@
+//! The message that a webhook gets at the end of a job: the JSON of its state.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use super::ServeError;
+use super::dto::JobDto;
+use crate::config::Config;
+use crate::durable::{Change, Durable};
+use crate::jobs::{Job, JobId, OnEnd};
+use crate::metrics::Metrics;
+use crate::webhooks::{Delivery, RootCerts, Secret, Target, WebhookSettings, Webhooks, roots};
+
+/// The payload, in the form of Standard Webhooks.
+#[derive(Serialize)]
+struct PayloadDto {
+    r#type: String,
+    timestamp: String,
+    data: JobDto,
+}
+
+/// Starts the webhooks, if there is a secret by which they are signed.
+pub fn start(
+    config: &Config,
+    durable: Option<Durable>,
+    metrics: &Arc<Metrics>,
+) -> Result<Option<Webhooks>, ServeError> {
+    let Some(text) = &config.webhook_secret else { return Ok(None) };
+    let roots = match &config.webhooks_ca {
+        None => RootCerts::WebPki,
+        Some(path) => {
+            let broken = |why: String| ServeError::WebhooksCa(format!("{}: {why}", path.display()));
+            let pem = std::fs::read(path).map_err(|error| broken(error.to_string()))?;
+            roots(&pem).ok_or_else(|| broken("there are no certificates in PEM".to_owned()))?
+        }
+    };
+    let settings = WebhookSettings {
+        roots,
+        secret: Secret::read(text).ok_or(ServeError::WebhookSecret)?,
+        to_private: config.webhooks_to_private,
+        retry: Duration::from_millis(config.webhook_retry_ms),
+        metrics: Some(metrics.clone()),
+    };
+    let settled = move |id: &str| {
+        if let (Some(durable), Some(id)) = (&durable, JobId::parse(id)) {
+            durable.store_soon(vec![Change::Notified(id.key(), crate::jobs::unix_ms())], Vec::new());
+        }
+    };
+    Ok(Some(Webhooks::start(settings, Box::new(settled))?))
+}
+
+/// Lets webhooks hear of the ends of jobs.
+pub fn of_jobs(webhooks: Option<&Webhooks>) -> Option<OnEnd> {
+    let webhooks = webhooks?.clone();
+    Some(OnEnd(Arc::new(move |job| {
+        if let Some(address) = &job.webhook {
+            send(Some(&webhooks), job, address);
+        }
+    })))
+}
+
+/// Tells a webhook of a job that has ended.
+pub fn send(webhooks: Option<&Webhooks>, job: &Arc<Job>, address: &str) {
+    let (Some(webhooks), Ok(target)) = (webhooks, Target::stored(address)) else {
+        return tracing::warn!(job = %job.id, "the webhook of a job is not told: there is no MESHSNAP_WEBHOOK_SECRET now");
+    };
+    let job = job.clone();
+    webhooks.send(Box::new(move || {
+        let timestamp = humantime::format_rfc3339_millis(std::time::SystemTime::now()).to_string();
+        let payload = PayloadDto { r#type: format!("job.{}", job.state().name()), timestamp, data: JobDto::new(&job) };
+        let payload = serde_json::to_string(&payload).ok()?;
+        Some(Delivery { id: job.id.to_string(), target, payload })
+    }));
+}

@@ -1,0 +1,195 @@
+//! The daemon: HTTP in front of [`crate::jobs`] and [`crate::store`].
+//!
+//! A request passes these modules in this order:
+//!
+//! 1. [`connection`] accepts the socket and limits how long a client may be silent.
+//! 2. [`router`] finds the handler of a path. [`middleware`] wraps it: request id, log, API key.
+//! 3. [`resources`] holds the handlers, one file per resource. They share [`state`].
+//! 4. [`receive`] reads the query and the body within their limits.
+//! 5. [`dto`] defines the JSON of answers, and [`error`] maps errors to statuses.
+//!
+//! [`recovery`] takes over what an earlier process has left in the data folder.
+//! [`negotiate`] and [`conditional`] read and write single headers. [`stored_mesh`] and [`address`]
+//! serve the resources of stored meshes. [`event_streams`] counts the clients that follow jobs, [`hear_of_ends`] tells webhooks of their ends.
+//! [`static_document`] answers with a constant document, [`descriptions`] are two of them.
+//!
+//! Architecture invariant: axum and hyper are used nowhere else.
+
+mod address;
+mod conditional;
+mod connection;
+mod descriptions;
+mod dto;
+mod error;
+mod event_streams;
+mod hear_of_ends;
+mod middleware;
+mod negotiate;
+mod receive;
+mod recovery;
+mod resources;
+mod router;
+mod signals;
+mod state;
+mod static_document;
+mod stored_mesh;
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::net::TcpListener;
+
+use crate::config::{Config, cores};
+use crate::durable::OpenError;
+use crate::keys::{Keys, KeysError};
+use crate::warm_up::WarmUp;
+use connection::accept::ConnectionLimits;
+use signals::{EndSignals, HangUps};
+use state::AppState;
+
+/// Time beyond a job's deadline after which the process ends without the jobs that still run.
+const DRAIN_GRACE: Duration = Duration::from_secs(5);
+
+/// Time that idle workers have to drop their renderers.
+const WORKERS_GRACE: Duration = Duration::from_secs(2);
+
+/// Reasons why the daemon did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// The address is open to other machines, and neither API keys nor `--no-auth` are given.
+    #[error(
+        "{0} can be reached from other machines, and no API keys are configured: set MESHSNAP_API_KEYS, or say --no-auth"
+    )]
+    Unprotected(SocketAddr),
+    /// The address cannot be resolved or bound.
+    #[error("cannot listen on `{listen}`: {error}")]
+    Listen {
+        /// The address as configured.
+        listen: String,
+        /// The cause.
+        error: std::io::Error,
+    },
+    /// The file of API keys cannot be used.
+    #[error(transparent)]
+    Keys(#[from] KeysError),
+    /// The secret of webhooks is none.
+    #[error(
+        "MESHSNAP_WEBHOOK_SECRET must be whsec_ and 24 to 64 bytes in base64: echo whsec_$(openssl rand -base64 32)"
+    )]
+    WebhookSecret,
+    /// The certificates for webhooks cannot be used.
+    #[error("--webhooks-ca {0}")]
+    WebhooksCa(String),
+    /// The data folder cannot be used.
+    #[error(transparent)]
+    Data(#[from] OpenError),
+    /// Threads or signal handlers could not be set up.
+    #[error("the server could not start: {0}")]
+    Start(#[from] std::io::Error),
+}
+
+/// Serves until SIGTERM or SIGINT, then finishes the accepted jobs. `ready` is called with the
+/// address once clients can connect.
+pub fn serve(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), ServeError> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        // Handlers only pass bytes on: a few threads are enough, and the workers need the cores.
+        .worker_threads(cores().clamp(1, 4) as usize)
+        .thread_name("http")
+        .enable_all()
+        .build()?;
+    runtime.block_on(run(config, ready))
+}
+
+async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), ServeError> {
+    let keys = Keys::open(&config.api_keys, config.api_keys_file.as_deref())?;
+    let listen_error = |error| ServeError::Listen { listen: config.listen.clone(), error };
+    let addresses: Vec<SocketAddr> = tokio::net::lookup_host(&config.listen).await.map_err(listen_error)?.collect();
+    if let Some(open) = addresses.iter().find(|a| !a.ip().is_loopback())
+        && keys.current().is_empty()
+        && !config.no_auth
+    {
+        return Err(ServeError::Unprotected(*open));
+    }
+    let listener = TcpListener::bind(&*addresses).await.map_err(listen_error)?;
+    let address = listener.local_addr()?;
+    let mut signals = EndSignals::new()?;
+    let hang_ups = HangUps::new()?;
+
+    let (state, recovered) = AppState::start(config, keys, address.ip().is_loopback())?;
+    tokio::spawn(reload_keys(hang_ups, state.clone()));
+    recovery::recover(&state, recovered);
+    let router = router::router(&state);
+    tracing::info!(%address, workers = config.workers, "ready");
+    ready(address);
+    let warm_up = WarmUp::start(&state.gpu, config.backend);
+
+    let stop = async {
+        signals.next().await;
+        let drained = async {
+            leave(&state, Duration::from_millis(config.drain_delay_ms)).await;
+            drain(&state, Duration::from_millis(config.limits.job_ms) + DRAIN_GRACE).await;
+        };
+        tokio::select! {
+            () = drained => {}
+            () = signals.next() => tracing::warn!("told twice to end: jobs are abandoned"),
+        }
+        state.event_streams.close();
+    };
+    let limits = ConnectionLimits {
+        all: config.connections as usize,
+        per_client: config.connections_per_address as usize,
+        header_time: Duration::from_millis(config.header_timeout_ms),
+        age: Duration::from_millis(config.connection_age_ms),
+        least_rate: config.least_rate_bytes,
+    };
+    connection::accept::run(listener, router, limits, stop).await;
+    warm_up.stop();
+    warm_up.wait(WORKERS_GRACE);
+    state.jobs.join(WORKERS_GRACE);
+    if let Some(webhooks) = &state.webhooks {
+        webhooks.close();
+    }
+    if let Some(durable) = &state.durable {
+        durable.close();
+    }
+    tracing::info!("ended");
+    Ok(())
+}
+
+/// Reads the file of API keys again with each SIGHUP. An error leaves the keys as they are.
+async fn reload_keys(mut hang_ups: HangUps, state: Arc<AppState>) {
+    while hang_ups.next().await {
+        let reloading = state.clone();
+        // A slow disk must hold nobody up.
+        match tokio::task::spawn_blocking(move || reloading.keys.reload()).await {
+            Ok(Ok(Some(named))) => tracing::info!(named, "SIGHUP: the API keys are read again"),
+            Ok(Ok(None)) => tracing::info!("SIGHUP changes nothing: there is no --api-keys-file"),
+            Ok(Err(error)) => tracing::error!(%error, "SIGHUP: the API keys stay as they are"),
+            Err(_) => tracing::error!("SIGHUP: the API keys were not read"),
+        }
+    }
+}
+
+/// Says at `/readyz` that the server ends, and takes work for a while all the same: those who distribute requests look there
+/// now and then, and send some until they have looked.
+async fn leave(state: &Arc<AppState>, delay: Duration) {
+    if !delay.is_zero() {
+        tracing::info!(seconds = delay.as_secs_f64(), "leaving: not ready any more, and work is taken for a while");
+        state.leave();
+        tokio::time::sleep(delay).await;
+    }
+}
+
+/// Refuses new work and waits until the accepted jobs have ended, no longer than `time_max`.
+/// Meanwhile clients can still connect, to read job states and fetch results.
+async fn drain(state: &Arc<AppState>, time_max: Duration) {
+    let load = state.jobs.load();
+    tracing::info!(queued = load.queued, running = load.running, "draining");
+    state.drain();
+    // Without a data folder, what waits is lost if it is not finished.
+    let waits = if state.durable.is_some() { Duration::ZERO } else { load.batch_wait.max(load.wait) * 2 };
+    if tokio::time::timeout(time_max + waits, state.jobs.idle()).await.is_err() {
+        tracing::warn!("some jobs did not end in time; those in a data folder are done at the next start");
+    }
+}

@@ -1,0 +1,184 @@
+//! From a request to work for a worker. The cheapest refusals come first.
+//!
+//! [`query`] reads the query, [`body`] the body within its limits. [`check`] and [`diff`] read requests for
+//! verdicts, by [`keys`] of their own. [`idempotency`] knows what is sent again. [`meshes`]
+//! makes a job of each mesh of a form.
+//! [`upload`] names what is to be stored. [`webhook`] reads who hears of a job's end.
+
+pub mod body;
+pub mod check;
+pub mod diff;
+pub mod idempotency;
+pub mod keys;
+pub mod meshes;
+pub mod query;
+pub mod upload;
+pub mod webhook;
+
+use std::sync::Arc;
+
+use axum::extract::Request;
+use axum::http::HeaderMap;
+
+use self::body::{BodyKind, BodyLimits, Upload};
+use self::idempotency::Sent;
+use self::meshes::MeshOfForm;
+use self::query::Query;
+use super::address::{Address, render_key};
+use super::error::ApiError;
+use super::middleware::observe;
+use super::state::AppState;
+use super::{negotiate, stored_mesh};
+use crate::digest::Digest;
+use crate::jobs::{ClaimName, Class, Job, Owner, Recipe, Task, Work};
+use crate::keys::Access;
+use crate::store::Reading;
+use meshsnap_render::limits::Limits;
+use meshsnap_render::request;
+use meshsnap_render::spec::Spec;
+
+/// Longest document, bytes, that is read although the queue is full: that of a stored mesh's picture, which
+/// may be in memory.
+const DOCUMENT_BYTES_MAX: u64 = 64 << 10;
+
+/// A request for a picture, once it is read.
+pub enum Reception {
+    /// One that was found valid.
+    New(Box<Received>),
+    /// One that was accepted before, as this job.
+    Known(Arc<Job>),
+    /// A form with several meshes, for a job each.
+    Many(Vec<MeshOfForm>),
+}
+
+/// A request for a picture that was found valid.
+pub struct Received {
+    /// The work for a worker.
+    pub work: Work,
+    /// The render key of the picture, if the mesh is stored.
+    pub key: Option<String>,
+    /// The address of the picture, if the mesh is stored.
+    pub address: Option<Address>,
+    /// True if the picture's format depends on `Accept`.
+    pub is_negotiated: bool,
+}
+
+/// The party that sends a request, and the names of the request.
+pub struct Sender {
+    owner: Owner,
+    request_id: Arc<str>,
+    webhook: Option<Arc<str>>,
+    /// The name that the client gave it, and its digest.
+    named: Option<(ClaimName, Digest)>,
+}
+
+/// Reads a request for a picture. Every fault that shows without reading the mesh is found here,
+/// before it takes a worker's time. A request for a job may have been accepted before.
+pub async fn receive(state: &AppState, request: Request, class: Class) -> Result<Reception, ApiError> {
+    let (access, request_id) = (access_of(&request), observe::id_of(&request));
+    body::check_header(request.headers(), state.rules.limits.body_bytes)?;
+    let query = Query::read(request.uri(), &state.rules)?;
+    let name = idempotency::name_of(request.headers(), &access.owner)?.filter(|_| class == Class::Batch);
+    let webhook = webhook::of(state, request.headers(), class)?;
+    // Forms and JSON may bring a document. Of every other request, the query is the whole document
+    // and is checked before the upload.
+    if !body::is_multipart(request.headers()) && !body::is_json(request.headers()) {
+        request::read(None, &query.overrides, &state.rules).map_err(query::query_error)?;
+    }
+    // A picture that is in memory needs no worker. A document that names its mesh is short.
+    // Nor does a request that was accepted before.
+    let is_sent_again = name.as_ref().is_some_and(|name| state.jobs.has_claim(name));
+    if !is_short_json(request.headers()) && !is_sent_again {
+        state.jobs.would_accept(class, &access.owner)?;
+    }
+
+    let headers = request.headers().clone();
+    let meshes = (class == Class::Batch).then(|| state.jobs.accepted_max() as u64);
+    let upload = read_body(state, request, meshes).await?;
+    let digest = match &name {
+        Some(_) => Some(idempotency::digest(&query, &upload, &headers).await?),
+        None => None,
+    };
+    let named = name.zip(digest);
+    if upload.kind == BodyKind::Meshes {
+        let sender = Sender { owner: access.owner, request_id, webhook, named };
+        return meshes::understand(state, query, upload, &headers, &sender).map(Reception::Many);
+    }
+    let claim = match &named {
+        Some((name, digest)) => match idempotency::check(state, name, *digest)? {
+            Sent::First(claim) => Some(claim),
+            Sent::Again(job) => return Ok(Reception::Known(job)),
+        },
+        None => None,
+    };
+    let mut received = understand(state, query, upload, &headers, &access)?;
+    received.work = Work { owner: access.owner, request_id, claim, webhook, ..received.work };
+    Ok(Reception::New(Box::new(received)))
+}
+
+/// Reads the document of a request, and finds the mesh that it names.
+fn understand(
+    state: &AppState,
+    query: Query,
+    upload: Upload,
+    headers: &HeaderMap,
+    access: &Access,
+) -> Result<Received, ApiError> {
+    let Query { reading, overrides } = query;
+    let mut is_negotiated = false;
+    let mut with_format = |mut spec: Spec| {
+        is_negotiated = negotiate::depends_on_accept(spec.image.format);
+        let format = negotiate::image_format(spec.image.format, headers)?;
+        request::set_format(&mut spec, format);
+        Ok::<_, ApiError>(Box::new(spec))
+    };
+    if let Some(document) = document_of(&upload, &reading, headers) {
+        let (name, spec) = request::read_with_mesh(document, &overrides, &state.rules)?;
+        let digest = Digest::parse(&name).ok_or_else(|| request::bad_mesh_name(&name))?;
+        let spec = with_format(spec)?;
+        let stored = stored_mesh::find(state, Some(&name), access)?;
+        let key = Some(render_key(state, digest, &reading, &spec));
+        let keys = request::all_dotted(document, &overrides, &spec, &state.rules);
+        let address = keys.and_then(|keys| Address::new(state, digest, &reading, &spec, &keys));
+        let document = upload.bundle.files().first().map(|file| file.bytes.clone());
+        let recipe = Some(Arc::new(Recipe { document, overrides, mesh: Some(digest) }));
+        let work = Work { recipe, ..stored_mesh::work_on(&stored, reading, Task::Draw(spec)) };
+        return Ok(Received { work, key, address, is_negotiated });
+    }
+    upload.bundle.check_sent().map_err(|error| ApiError::from(&error))?;
+    let spec = with_format(request::read(upload.document.as_deref(), &overrides, &state.rules)?)?;
+    let memory = Arc::new(upload.reservation);
+    let recipe = Some(Arc::new(Recipe { document: upload.document, overrides, mesh: None }));
+    let work = Work { recipe, ..stored_mesh::work(upload.bundle, reading, Task::Draw(spec), memory) };
+    Ok(Received { work, key: None, address: None, is_negotiated })
+}
+
+/// True for a document that names its mesh, and so is short.
+fn is_short_json(headers: &HeaderMap) -> bool {
+    body::is_json(headers) && body::announced_length(headers).is_some_and(|length| length <= DOCUMENT_BYTES_MAX)
+}
+
+/// What the sender of a request sees.
+pub fn access_of(request: &Request) -> Access {
+    request.extensions().get::<Access>().cloned().unwrap_or_default()
+}
+
+/// The body, if it is a request document that names a stored mesh. A request with `format_in` has a
+/// mesh as its body, so that faulty JSON is then no document.
+fn document_of<'u>(upload: &'u Upload, reading: &Reading, headers: &HeaderMap) -> Option<&'u [u8]> {
+    let body = upload.bundle.files().first().filter(|_| upload.kind == BodyKind::Raw)?.bytes.as_ref();
+    let is_faulty = || reading.format_in.is_none() && request::is_faulty_document(body, body::is_json(headers));
+    (request::names_mesh(body) || is_faulty()).then_some(body)
+}
+
+/// Reads a body that brings one mesh, within this server's limits.
+pub async fn read_upload(state: &AppState, request: Request) -> Result<Upload, ApiError> {
+    read_body(state, request, None).await
+}
+
+async fn read_body(state: &AppState, request: Request, meshes: Option<u64>) -> Result<Upload, ApiError> {
+    let Limits { body_bytes: bytes, bundle_entries: files, .. } = state.rules.limits;
+    let (time, least_rate, memory) = (state.body_timeout, state.least_rate, &state.memory);
+    let limits = BodyLimits { bytes, files, meshes, time, least_rate, memory };
+    body::read(request, limits).await
+}

@@ -1,0 +1,218 @@
+//! What an earlier process has left in the data folder: its stored meshes, its jobs that have not ended, and the
+//! results of those that have.
+
+use std::sync::Arc;
+
+use super::error::{ApiError, record_of};
+use super::hear_of_ends;
+use super::receive::keys::Keys;
+use super::receive::{check, diff};
+use super::state::AppState;
+use super::stored_mesh;
+use crate::durable::{ClaimRecord, FileRecord, Hold, JobRecord, MeshRecord, Recovered, RecoveredJob, RequestKind};
+use crate::jobs::{
+    Claim, ClaimName, Failure, JSON, JobId, JobState, Named, Newer, Owner, Recipe, Restored, Task, Work, read_picture,
+    value_of,
+};
+use crate::memory::Account;
+use crate::store::{NewMesh, Reading};
+use meshsnap_render::import::{Bundle, BundleFile, Format};
+use meshsnap_render::limits::Lender;
+use meshsnap_render::request;
+
+/// How often a job may be begun by processes that then ended.
+const STARTS_MAX: u32 = 5;
+
+/// Files of a record, and the holds on them.
+type Files = (Vec<BundleFile>, Vec<Arc<Hold>>);
+
+/// Takes everything over. Jobs that have not ended are queued in the order of acceptance.
+pub fn recover(state: &AppState, mut recovered: Recovered) {
+    let meshes = std::mem::take(&mut recovered.meshes);
+    let jobs = std::mem::take(&mut recovered.jobs);
+    let (mesh_count, job_count) = (meshes.len(), jobs.len());
+    for record in meshes {
+        restore_mesh(state, &recovered, record);
+    }
+    let mut queued = 0;
+    for job in jobs {
+        let name = Restored {
+            id: JobId::from_key(job.record.key),
+            accepted_unix_ms: job.record.accepted_unix_ms,
+            owner: Owner::new(&job.record.owner),
+            claim: claim(state, &job.record),
+        };
+        if job.end.is_some() {
+            let (id, end) = (name.id, job.end.as_ref());
+            let is_told = end.is_some_and(|end| end.notified_unix_ms.is_some());
+            let webhook = job.record.webhook.clone().filter(|_| !is_told);
+            restore_result(state, &recovered, name, job);
+            tell(state, id, webhook.as_deref());
+            continue;
+        }
+        match resumed(state, &recovered, &job) {
+            Ok((work, holds)) => {
+                queued += 1;
+                let work = Work { claim: name.claim, ..work };
+                state.jobs.resume((name.id, name.accepted_unix_ms), work, holds);
+            }
+            Err(failure) => {
+                let id = name.id;
+                state.jobs.restore(name, JobState::Failed(Arc::new(failure)), None, Vec::new());
+                tell(state, id, job.record.webhook.as_deref());
+            }
+        }
+    }
+    if mesh_count + job_count > 0 {
+        tracing::info!(meshes = mesh_count, jobs = job_count, queued, "taken over from the data folder");
+    }
+}
+
+/// Tells the webhook of a job of its end, of which an earlier process has not told it.
+fn tell(state: &AppState, id: JobId, webhook: Option<&str>) {
+    if let (Some(address), Some(job)) = (webhook, state.jobs.find(id)) {
+        hear_of_ends::send(state.webhooks.as_ref(), &job, address);
+    }
+}
+
+fn restore_mesh(state: &AppState, recovered: &Recovered, record: MeshRecord) {
+    let Some((files, mut holds)) = files(recovered, &record.files) else {
+        return tracing::warn!(mesh = %record.digest, "a stored mesh is lost: its file is missing or damaged");
+    };
+    let Some((report, hold)) = recovered.bytes(record.report) else { return };
+    holds.push(hold);
+    let reading = reading(record.format_in.as_deref(), record.entry.clone());
+    let mesh = NewMesh {
+        digest: record.digest,
+        bundle: Bundle::of_files(files),
+        reading,
+        report,
+        owners: record.owners().map(|owner| Owner::new(owner)).collect(),
+    };
+    if let Err(error) = state.meshes.insert(mesh, holds.into()) {
+        tracing::warn!(mesh = %record.digest, %error, "a stored mesh does not fit any more");
+    }
+}
+
+fn restore_result(state: &AppState, recovered: &Recovered, name: Restored, job: RecoveredJob) {
+    let Some(mut end) = job.end else { return };
+    let mut holds = Vec::new();
+    let ended = match (end.picture.take(), end.error.take()) {
+        (Some(picture), _) => {
+            let found = recovered.bytes(picture.digest);
+            let read = found.and_then(|(bytes, hold)| {
+                holds.push(hold);
+                read_picture(picture, bytes)
+            });
+            read.map_or(JobState::Failed(Arc::new(Failure::Lost)), |finished| {
+                JobState::Done(Arc::new(finished.counted(&state.memory)))
+            })
+        }
+        (None, Some(error)) => JobState::Failed(Arc::new(Failure::Recorded(error))),
+        (None, None) => JobState::Cancelled,
+    };
+    state.jobs.restore(name, ended, Some(&end), holds);
+}
+
+/// The work of a job that has not ended, or the reason why it cannot be done.
+fn resumed(state: &AppState, recovered: &Recovered, job: &RecoveredJob) -> Result<(Work, Vec<Arc<Hold>>), Failure> {
+    if job.starts >= STARTS_MAX {
+        return Err(Failure::Crashed { times: job.starts });
+    }
+    let record = &job.record;
+    let (files, mut holds) = files(recovered, &record.files).ok_or(Failure::Lost)?;
+    let document = match record.request.document {
+        Some(digest) => {
+            let (bytes, hold) = recovered.bytes(digest).ok_or(Failure::Lost)?;
+            holds.push(hold);
+            Some(bytes)
+        }
+        None => None,
+    };
+    let newer = match &record.newer {
+        Some(side) => {
+            let (files, own) = self::files(recovered, &side.files).ok_or(Failure::Lost)?;
+            let bundle = Bundle::restored(files, side.is_zip, record.entry.clone());
+            let memory = state.memory.share(Account::Uploads);
+            memory.take(bundle.bytes_len());
+            holds.extend(own.iter().cloned());
+            Some(Newer { bundle, memory: Arc::new(memory), holds: own.into(), mesh: side.mesh })
+        }
+        None => None,
+    };
+    let task = task(state, record, document.as_deref(), newer)?;
+    let recipe = Recipe { document, overrides: record.request.overrides.clone().into(), mesh: record.mesh };
+    let bundle = Bundle::restored(files, record.is_zip, record.entry.clone());
+    let memory = state.memory.share(Account::Uploads);
+    memory.take(bundle.bytes_len());
+    let reading = reading(record.format_in.as_deref(), record.entry.clone());
+    let mesh_key = record.mesh.map(|digest| stored_mesh::key(digest, &reading));
+    let (format_in, memory, recipe) = (reading.format_in, Arc::new(memory), Some(Arc::new(recipe)));
+    let (owner, request_id) = (Owner::new(&record.owner), record.request_id.as_str().into());
+    let (claim, own, webhook) = (None, [].into(), record.webhook.as_deref().map(Into::into));
+    let lender = Lender(None);
+    Ok((
+        Work {
+            bundle,
+            format_in,
+            mesh_key,
+            task,
+            memory,
+            lender,
+            recipe,
+            owner,
+            request_id,
+            holds: own,
+            claim,
+            webhook,
+        },
+        holds,
+    ))
+}
+
+/// The name of the job's request, so that the request is known when it is sent again.
+fn claim(state: &AppState, record: &JobRecord) -> Option<Arc<Claim>> {
+    let ClaimRecord { key, request } = record.claim.as_ref()?;
+    let name = ClaimName { owner: Owner::new(&record.owner), key: key.as_str().into() };
+    match state.jobs.claim(&name, *request) {
+        Named::New(claim) => Some(claim),
+        Named::Known(_) | Named::Pending | Named::Other => None,
+    }
+}
+
+/// The request is read again, under the limits of this process.
+fn task(state: &AppState, record: &JobRecord, document: Option<&[u8]>, newer: Option<Newer>) -> Result<Task, Failure> {
+    let (overrides, rules) = (&record.request.overrides, &state.rules);
+    let recorded = |error| Failure::Recorded(record_of(error));
+    match record.request.kind {
+        RequestKind::Draw => {}
+        RequestKind::Check => {
+            let digest = record.request.upload.ok_or(Failure::Lost)?;
+            return check::task(&Keys::stored(overrides), digest).map_err(recorded);
+        }
+        RequestKind::Diff => {
+            let format = (record.request.format != JSON).then(|| value_of(&record.request.format).ok_or(Failure::Lost));
+            let answer = diff::Answer::of(state, &Keys::stored(overrides), format.transpose()?).map_err(recorded)?;
+            return Ok(answer.task(newer.ok_or(Failure::Lost)?));
+        }
+    }
+    let read = match document.filter(|_| record.request.names_mesh) {
+        Some(document) => request::read_with_mesh(document, overrides, rules).map(|(_, spec)| spec),
+        None => request::read(document, overrides, rules),
+    };
+    let mut spec = read.map_err(|error| recorded(ApiError::from(error)))?;
+    request::set_format(&mut spec, value_of(&record.request.format).ok_or(Failure::Lost)?);
+    Ok(Task::Draw(Box::new(spec)))
+}
+
+fn files(recovered: &Recovered, records: &[FileRecord]) -> Option<Files> {
+    let found = records.iter().map(|record| {
+        let (bytes, hold) = recovered.bytes(record.digest)?;
+        Some((BundleFile { path: record.path.clone(), bytes }, hold))
+    });
+    found.collect()
+}
+
+fn reading(format_in: Option<&str>, entry: Option<String>) -> Reading {
+    Reading { format_in: format_in.and_then(Format::from_name), entry }
+}

@@ -1,0 +1,38 @@
+//! Verdicts on meshes: [`check`] judges one, [`diff`] compares two. Both wait for a worker while the client waits,
+//! unless the answer is in memory, or accept a job.
+
+pub mod check;
+pub mod diff;
+
+use axum::response::Response;
+
+use super::{responses, run};
+use crate::http::error::ApiError;
+use crate::http::receive::check::Asked;
+use crate::http::state::AppState;
+
+/// The answer to a request that a client waits for.
+async fn answer(state: &AppState, asked: Asked) -> Result<Response, ApiError> {
+    match asked {
+        Asked::New { work, key } => {
+            let found = state.pictures.find(&key, run::draw(state, *work)).await?;
+            state.metrics.picture(found.source.name());
+            Ok(responses::found(&found, Some(&key)))
+        }
+        // Unreachable: requests that a client waits for have no names.
+        Asked::Known(job) => Ok(responses::accepted(&job)),
+    }
+}
+
+/// The answer to a request for a job: always 202.
+async fn accepted(state: &AppState, asked: Asked) -> Result<Response, ApiError> {
+    match asked {
+        Asked::New { work, .. } => Ok(responses::accepted(&*state.jobs.accept(*work).await?)),
+        Asked::Known(job) => Ok(responses::accepted(&job)),
+    }
+}
+
+fn applied(mut response: Response) -> Response {
+    responses::set_preference_applied(&mut response, "respond-async");
+    response
+}

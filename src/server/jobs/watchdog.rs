@@ -1,0 +1,126 @@
+//! Workers that do not stop when the time of their job is up: a bug keeps them busy, and nothing can end a thread from
+//! outside. After a grace such a worker is reported and another takes its place; it ends itself if its job ever does.
+//! A mesh that did this twice is not drawn again.
+
+use std::collections::{HashMap, HashSet};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::job::Job;
+use crate::digest::Digest;
+use meshsnap_render::import::Bundle;
+
+/// Workers that a mesh may keep busy before it is refused.
+const STRIKES: u32 = 2;
+
+/// Most meshes that are remembered. One that is evil can be changed by a byte each time, so that no list is complete.
+const MESHES_MAX: usize = 1024;
+
+/// A job that occupies a worker.
+pub struct Running {
+    /// The job.
+    pub job: Arc<Job>,
+    /// Its mesh.
+    pub bundle: Bundle,
+    /// The moment at which the worker has begun it.
+    pub since: Instant,
+}
+
+impl Running {
+    /// Time until it ends, as far as is known. A job that takes longer than its estimate is expected to
+    /// take as long again as it is late. It stops when its time is up.
+    pub fn remaining(&self, limit: Duration) -> Duration {
+        let so_far = self.since.elapsed();
+        so_far.abs_diff(self.job.estimate).min(limit.saturating_sub(so_far))
+    }
+}
+
+/// The workers that are busy for too long.
+#[derive(Default)]
+pub struct Overdue {
+    /// Serial numbers of their jobs.
+    jobs: HashSet<u64>,
+    /// Those in whose place there is no other.
+    unreplaced: usize,
+}
+
+impl Overdue {
+    /// A worker is busy for too long. True if another is to take its place: where many are stuck, more threads would
+    /// take the machine from those that work.
+    pub fn add(&mut self, job: &Job, workers: usize) -> bool {
+        self.jobs.insert(job.serial);
+        let is_replaced = self.jobs.len() <= workers.saturating_mul(2);
+        self.unreplaced += usize::from(!is_replaced);
+        is_replaced
+    }
+
+    /// A worker has ended a job. True if it goes on: another may have taken its place.
+    pub fn ended(&mut self, job: &Job) -> bool {
+        if !self.jobs.remove(&job.serial) {
+            return true;
+        }
+        let goes_on = self.unreplaced > 0;
+        self.unreplaced -= usize::from(goes_on);
+        goes_on
+    }
+
+    /// Number of workers that are stuck, and of those that have no replacement.
+    pub fn counts(&self) -> (usize, usize) {
+        (self.jobs.len(), self.unreplaced)
+    }
+}
+
+/// The meshes that keep workers busy.
+#[derive(Default)]
+pub struct Quarantine(Mutex<HashMap<Digest, Entry>>);
+
+struct Entry {
+    strikes: u32,
+    bytes: u64,
+    last: Instant,
+}
+
+impl Quarantine {
+    /// A worker is stuck with this mesh. Returns its digest, and how often that has happened.
+    pub fn strike(&self, bundle: &Bundle) -> (Digest, u32) {
+        let (digest, bytes, last) = (digest(bundle), bundle.bytes_len(), Instant::now());
+        let mut meshes = self.lock();
+        if meshes.len() >= MESHES_MAX
+            && let Some(oldest) = meshes.iter().min_by_key(|(_, entry)| entry.last).map(|(digest, _)| *digest)
+        {
+            meshes.remove(&oldest);
+        }
+        let entry = meshes.entry(digest).or_insert(Entry { strikes: 0, bytes, last });
+        entry.strikes += 1;
+        entry.last = last;
+        (digest, entry.strikes)
+    }
+
+    /// The digest of a mesh that is refused.
+    pub fn holds(&self, bundle: &Bundle) -> Option<Digest> {
+        let bytes = bundle.bytes_len();
+        // Hashing takes a while, and hardly ever is there anything to compare with.
+        if !self.lock().values().any(|entry| entry.bytes == bytes && entry.strikes >= STRIKES) {
+            return None;
+        }
+        let digest = digest(bundle);
+        self.lock().get(&digest).is_some_and(|entry| entry.strikes >= STRIKES).then_some(digest)
+    }
+
+    /// Number of meshes that are refused.
+    pub fn count(&self) -> usize {
+        self.lock().values().filter(|entry| entry.strikes >= STRIKES).count()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashMap<Digest, Entry>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The name of a mesh, as the store of meshes has it.
+fn digest(bundle: &Bundle) -> Digest {
+    match bundle.files() {
+        [one] => Digest::of(&one.bytes),
+        files => Digest::of_files(files),
+    }
+}

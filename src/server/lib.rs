@@ -1,0 +1,26 @@
+//! The daemon: [`http`] in front of [`jobs`] (the queue, the workers and their results) and
+//! [`store`] (meshes that stay). [`durable`] is the data folder, where both outlive the process. [`memory`] is what all of them share. [`residents`] and
+//! [`pictures`] remember what was read and drawn, and [`metrics`] what happened. [`keys`] says who may do what, [`rates`] how much, and
+//! [`signature`] lets addresses be used without a key. [`warm_up`] makes the first picture come sooner, [`priority`] lets answers go before pictures, [`webhooks`] tell receivers of the ends of jobs.
+//!
+//! Architecture invariant: [`http`] alone knows HTTP.
+
+mod cache;
+pub mod config;
+pub mod digest;
+pub mod durable;
+pub mod http;
+pub mod jobs;
+pub mod keys;
+pub mod memory;
+pub mod metrics;
+pub mod percent;
+pub mod pictures;
+pub mod priority;
+pub mod rates;
+pub mod residents;
+pub mod signature;
+pub mod store;
+pub mod telemetry;
+pub mod warm_up;
+pub mod webhooks;
