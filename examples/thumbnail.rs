@@ -1,6 +1,6 @@
 //! Draws a mesh file into a PNG file.
 //!
-//!     cargo run --release --example thumbnail -- api/examples/knot.obj knot.png
+//!     cargo run --release -p meshsnap --example thumbnail -- api/examples/knot.obj knot.png
 
 use std::error::Error;
 
@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for warning in mesh.warnings() {
         eprintln!("{}: {}", warning.code, warning.detail);
     }
-    let spec = Spec::wire().size_px(256, 256)?.set("background", "transparent")?;
+    let spec = Spec::wire().size(256, 256).transparent();
     let image = Renderer::auto().render(&mesh, &spec)?;
     std::fs::write(output, image.to_png()?)?;
     println!("{output}: {} triangles, {} x {} px", mesh.triangle_count(), image.width_px, image.height_px);

@@ -1,6 +1,6 @@
 //! Draws one mesh from many sides: it is read once.
 //!
-//!     cargo run --release --example turntable -- api/examples/knot.obj 12 frames/
+//!     cargo run --release -p meshsnap --example turntable -- api/examples/knot.obj 12 frames/
 
 use std::error::Error;
 use std::path::Path;
@@ -14,12 +14,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let count: u32 = count.parse()?;
     let mesh = Mesh::read(&std::fs::read(input)?)?;
-    let style = Spec::outline().size_px(320, 320)?;
+    let style = Spec::outline().size(320, 320);
     let mut renderer = Renderer::cpu();
     std::fs::create_dir_all(folder)?;
     for frame in 0..count {
         let azimuth_deg = 360.0 * f64::from(frame) / f64::from(count) - 180.0;
-        let spec = style.set("camera.azimuth_deg", &azimuth_deg.to_string())?;
+        let spec = style.clone().direction(azimuth_deg, 20.0);
         let image = renderer.render(&mesh, &spec)?;
         std::fs::write(Path::new(folder).join(format!("{frame:03}.png")), image.to_png()?)?;
     }

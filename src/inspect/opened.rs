@@ -9,10 +9,12 @@ use meshsnap_render::image::{Image, ImageFormat};
 use meshsnap_render::import::{self, Bundle, Imported, MeshError};
 use meshsnap_render::limits::{Budget, Deadline, LimitExceeded, Limits};
 use meshsnap_render::mesh::Mesh;
-use meshsnap_render::pipeline::{Drawn, Output, PlanError, RenderError, Stage, View, draw_view};
+use meshsnap_render::pipeline::{
+    Context, Drawn, Output, PlanError, RenderError, Stage, Staged, View, draw_cells, draw_view, with_scene,
+};
 use meshsnap_render::plan::{self, Prepared};
 use meshsnap_render::scene::Scene;
-use meshsnap_render::sheet::{self, Canvas, Layout};
+use meshsnap_render::sheet::{self, Cell, Layout};
 use meshsnap_render::spec::{CameraSpec, Sheet, SheetViews, Spec};
 
 /// A file that was read, to be judged or compared.
@@ -73,8 +75,8 @@ impl Opened {
     ) -> Result<Image, RenderError> {
         let mut budget = self.budget_of(beside)?;
         let framing = self.framing_with(beside, &mut budget)?;
-        let view = self.view(framing.as_deref());
-        Ok(draw_view(view, spec, None, backends, &mut budget, deadline, &mut |_| ())?.image)
+        let mut cx = Context { backends, budget, deadline, ended: &mut |_| () };
+        Ok(draw_view(self.view(framing.as_deref()), spec, None, &mut cx)?.image)
     }
 
     /// A request whose camera takes this file's word for what is up.
@@ -93,14 +95,9 @@ impl Opened {
         places: &[Place],
         deadline: &Deadline,
     ) -> Result<(), RenderError> {
-        let (mesh, mut budget) = (&self.imported.mesh, self.budget_of(beside)?);
-        let framing = match self.framing_with(beside, &mut budget)? {
-            None => plan::framing(mesh, spec, &self.prepared, &mut budget, deadline)?,
-            framing => framing,
-        };
-        let scene = Scene::framed_by(framing.as_deref().unwrap_or(&mesh.positions), mesh, spec, &mut budget)?;
-        mark_places(image, &scene, places);
-        Ok(())
+        let mut budget = self.budget_of(beside)?;
+        let framing = self.framing_with(beside, &mut budget)?;
+        mark_in(image, self.view(framing.as_deref()), spec, places, &mut budget, deadline)
     }
 
     fn view<'a>(&'a self, framing: Option<&'a [[f32; 3]]>) -> View<'a> {
@@ -123,6 +120,24 @@ impl Opened {
         budget.spend("the other mesh", other.budget.spent_bytes(), 1)?;
         Ok(budget)
     }
+}
+
+/// Marks places in a picture of a view.
+fn mark_in(
+    image: &mut Image,
+    view: View<'_>,
+    spec: &Spec,
+    places: &[Place],
+    budget: &mut Budget,
+    deadline: &Deadline,
+) -> Result<(), RenderError> {
+    with_scene(view, spec, false, budget, deadline, |Staged { scene, is_uv_layout, .. }, _| {
+        // Places in space are nowhere in a layout of the texture.
+        if !is_uv_layout {
+            mark_places(image, &scene, places);
+        }
+        Ok(())
+    })
 }
 
 /// Marks places in a picture of a scene.
@@ -193,7 +208,7 @@ pub fn draw_difference(
     backends: &mut Backends,
     deadline: &Deadline,
 ) -> Result<Drawn, RenderError> {
-    let budget = &mut opened[0].budget_beside(opened[1])?;
+    let budget = opened[0].budget_beside(opened[1])?;
     let meshes = opened.map(|opened| &opened.imported.mesh);
     let all = compared.of_vertices.iter().flatten();
     let most = all.copied().filter(|distance| distance.is_finite()).fold(0.0, f64::max);
@@ -203,51 +218,35 @@ pub fn draw_difference(
     let plain = Spec { image: spec.image, camera, ..plain.clone() };
     let views = SheetViews::Named(vec![spec.camera.view; sides.len()]);
     let sheet = Sheet { views, columns: Some(sides.len() as u32), labels: false };
-    let layout = Layout::new(&sheet, &spec.image, false);
-    let mut canvas = Canvas::new(layout, budget).map_err(PlanError::Limit)?;
-    let mut all: Option<Drawn> = None;
-    for (cell, &side) in layout.cells().zip(sides).filter(|(cell, _)| !cell.size_px.contains(&0)) {
-        // The memory of a side is free again before the next.
-        let mut of_cell = budget.clone();
+    let draw_side = |cell: Option<&Cell>, cx: &mut Context<'_>| {
         let limit = |error| RenderError::from(PlanError::Limit(error));
-        let index = side.index();
-        let framing = diff::framing(meshes[index], meshes[1 - index], &mut of_cell).map_err(limit)?;
-        let mut drawn = match side {
-            Side::Before | Side::After => {
-                let of_view = sheet::cell_spec(&plain, &sheet, &cell);
-                let view = opened[index].view(Some(&framing));
-                draw_view(view, &of_view, None, backends, &mut of_cell, deadline, &mut |_| ())?
-            }
-            Side::HeatBefore | Side::HeatAfter => {
-                let mesh = heat(meshes[index], compared, index, most, &mut of_cell).map_err(limit)?;
-                let of_view = sheet::cell_spec(&spec, &sheet, &cell);
-                let view = View { mesh: &mesh, prepared: &Prepared::default(), framing: Some(&framing) };
-                draw_view(view, &of_view, None, backends, &mut of_cell, deadline, &mut |_| ())?
-            }
-        };
-        if let (true, Some(place)) = (side.has_colors(), compared.hidden_place(index)) {
-            let of_view = sheet::cell_spec(&spec, &sheet, &cell);
-            let scene = Scene::framed_by(&framing, meshes[index], &of_view, &mut of_cell)?;
-            mark_places(&mut drawn.image, &scene, &[Place::Vertex(place)]);
-        }
-        canvas.paste(&cell, &drawn.image);
-        // One side in colours stands beside pictures of both.
-        match sides {
-            [Side::HeatBefore] => canvas.write(&cell, "before: distance"),
-            [Side::HeatAfter] => canvas.write(&cell, "after: distance"),
-            _ => canvas.write(&cell, side.label()),
-        }
-        match &mut all {
-            Some(all) => all.add(drawn),
-            None => all = Some(drawn),
-        }
-    }
-    let mut all = match all {
-        Some(all) => all,
         // A picture of one pixel has no room for several sides.
-        None => draw_view(opened[1].view(None), &plain, None, backends, budget, deadline, &mut |_| ())?,
+        let Some((cell, side)) = cell.and_then(|cell| Some((cell, sides[cell.view? as usize]))) else {
+            return draw_view(opened[1].view(None), &plain, None, cx);
+        };
+        let index = side.index();
+        let framing = diff::framing(meshes[index], meshes[1 - index], &mut cx.budget).map_err(limit)?;
+        let view = opened[index].view(Some(&framing));
+        if !side.has_colors() {
+            return draw_view(view, &sheet::cell_spec(&plain, &sheet, cell), None, cx);
+        }
+        let of_view = sheet::cell_spec(&spec, &sheet, cell);
+        let mesh = heat(meshes[index], compared, index, most, &mut cx.budget).map_err(limit)?;
+        let painted = View { mesh: &mesh, prepared: &Prepared::default(), framing: Some(&framing) };
+        let mut drawn = draw_view(painted, &of_view, None, cx)?;
+        if let Some(place) = compared.hidden_place(index) {
+            mark_in(&mut drawn.image, view, &of_view, &[Place::Vertex(place)], &mut cx.budget, deadline)?;
+        }
+        Ok(drawn)
     };
-    all.image = canvas.finish();
+    // One side in colours stands beside pictures of both.
+    let label = |view: u32| match sides {
+        [Side::HeatBefore] => Some("before: distance".to_owned()),
+        [Side::HeatAfter] => Some("after: distance".to_owned()),
+        _ => Some(sides[view as usize].label().to_owned()),
+    };
+    let mut cx = Context { backends, budget, deadline, ended: &mut |_| () };
+    let mut all = draw_cells(Layout::new(&sheet, &spec.image, false), &mut cx, draw_side, label)?;
     // Where no vertex has a distance, there is one colour.
     if most > 0.0 && sides.iter().any(|side| side.has_colors()) {
         let plan::Legend { title, ends, colors } = diff::legend(most);
@@ -275,6 +274,5 @@ pub fn render_difference(
     let format = spec.image.format.unwrap_or(ImageFormat::Png);
     let bytes = encode::encode(&drawn.image, format, spec.image.effort, deadline)?;
     ended(Stage::Encode);
-    let Drawn { backend, is_substitute, draw_times, skips, short_chains, warnings, selection, .. } = drawn;
-    Ok(Output { bytes, format, backend, is_substitute, draw_times, skips, short_chains, warnings, selection })
+    Ok(Output { bytes, format, report: drawn.report })
 }

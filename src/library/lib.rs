@@ -17,8 +17,9 @@
 //! ```
 //!
 //! - [`Mesh`] is read once, from the bytes of any format that is known, and drawn as often as needed.
-//! - [`Spec`] says what to draw: a style, and the keys of the request document.
-//! - [`Renderer`] draws, on the CPU or on a GPU, and gives an [`Image`].
+//! - [`Spec`] says what to draw: a style, setters for what is asked for often, and the keys of the request document.
+//! - [`Renderer`] draws, on the CPU or on a GPU, and gives an [`Image`]. [`Watch`] hears of the stages and can stop it, and
+//!   [`Renderer::faces`] tells the triangle and the distance of each pixel.
 //! - [`Error`] says what went wrong; [`Error::fault`] says who can mend it.
 //!
 //! # Features
@@ -49,13 +50,28 @@ mod spec;
 
 pub use error::{Error, Fault};
 pub use mesh::{Mesh, MeshReader};
-pub use meshsnap_render::backend::{BackendKind, DrawError};
-pub use meshsnap_render::encode::EncodeError;
-pub use meshsnap_render::image::{Image, ImageFormat, Pixels};
-pub use meshsnap_render::import::{Format, MeshError, MeshFault};
-pub use meshsnap_render::limits::{Deadline, LimitExceeded, Limits, Stopped};
-pub use meshsnap_render::plan::{PlanError, Skip, SkipKind};
-pub use meshsnap_render::request::{RequestError, RequestFault};
-pub use meshsnap_render::warning::Warning;
-pub use renderer::{Picture, Renderer};
+pub use renderer::{Picture, Renderer, Watch};
 pub use spec::Spec;
+
+#[doc(inline)]
+pub use meshsnap_render::backend::{BackendKind, DrawError};
+#[doc(inline)]
+pub use meshsnap_render::encode::EncodeError;
+#[doc(inline)]
+pub use meshsnap_render::image::{Image, ImageFormat, Pixels};
+#[doc(inline)]
+pub use meshsnap_render::import::{Format, MeshError, MeshFault};
+#[doc(inline)]
+pub use meshsnap_render::limits::{Deadline, LimitExceeded, Limits, Stopped};
+#[doc(inline)]
+pub use meshsnap_render::mesh::UpAxis;
+#[doc(inline)]
+pub use meshsnap_render::pipeline::{FaceBuffer, Stage};
+#[doc(inline)]
+pub use meshsnap_render::plan::{PlanError, Skip, SkipKind};
+#[doc(inline)]
+pub use meshsnap_render::request::{RequestError, RequestFault};
+#[doc(inline)]
+pub use meshsnap_render::spec::{Hidden, NamedView as View, Samples, WireEdges};
+#[doc(inline)]
+pub use meshsnap_render::warning::Warning;

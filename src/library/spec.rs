@@ -1,26 +1,44 @@
-//! The request as a Rust value: a style and the keys of the request document.
+//! The request as a Rust value: a style, typed setters, and the keys of the request document.
+
+use std::sync::{Arc, OnceLock};
+
+use meshsnap_render::limits::Limits;
+use meshsnap_render::mesh::UpAxis;
+use meshsnap_render::request::{self, Rules, word_for};
+use meshsnap_render::spec::{self, BackendChoice, Hidden, NamedView, ProjectionKind, Samples, WireEdges};
 
 use crate::Error;
-use meshsnap_render::limits::Limits;
-use meshsnap_render::request::{self, Rules};
-use meshsnap_render::spec::{self, BackendChoice};
 
-/// A request: a style, and the keys of the request document that override it.
+/// A request: a style, and what overrides it.
 ///
-/// Styles and keys are those of the HTTP interface and of `meshsnap render`.
+/// Each setter gives the spec back, so that they can be written in a row. Later ones override earlier ones. A value that is
+/// out of range is an error of the first picture, or of [`Spec::check`].
+///
+/// ```
+/// use meshsnap::{Spec, View};
+///
+/// let spec = Spec::wire().size(800, 600).view(View::Iso).line_width(1.5).line_color("#a00");
+/// spec.check(&Default::default())?;
+/// # Ok::<(), meshsnap::Error>(())
+/// ```
+///
+/// What has no setter is a key of the request document, the same as over HTTP and on the command line
+/// (docs/request.md lists them):
 ///
 /// ```
 /// use meshsnap::Spec;
 ///
-/// let spec = Spec::wire().size_px(256, 192)?.set("view", "front")?.set("wire.color", "#a00")?;
-/// let error = spec.set("wire.thickness", "wide").unwrap_err();
-/// assert!(error.to_string().contains("wire.thickness"));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// let spec = Spec::outline().set("outline.thickness", "3").set("outline.unit", "px");
+/// let error = spec.set("outline.thickness", "wide").check(&Default::default()).unwrap_err();
+/// assert!(error.to_string().contains("outline.thickness"));
 /// ```
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct Spec {
-    document: Option<Vec<u8>>,
-    overrides: Vec<(String, String)>,
+    document: Option<Arc<[u8]>>,
+    /// Dotted keys and their values, as text.
+    keys: Vec<(String, String)>,
+    /// The request as it is read under the default limits. It is read once, by whatever needs it first.
+    read: Arc<OnceLock<spec::Spec>>,
 }
 
 macro_rules! styles {
@@ -28,7 +46,7 @@ macro_rules! styles {
         /// Styles: where a spec begins.
         impl Spec {
             $($(#[$doc])* pub fn $function() -> Self {
-                Self { document: None, overrides: vec![("style".to_owned(), $word.to_owned())] }
+                Self::default().set("style", $word)
             })*
         }
 
@@ -66,34 +84,146 @@ styles! {
     xray = "xray",
 }
 
+/// The picture.
+impl Spec {
+    /// Width and height, pixels.
+    #[must_use]
+    pub fn size(self, width_px: u32, height_px: u32) -> Self {
+        self.set("size", format!("{width_px}x{height_px}"))
+    }
+
+    /// Samples per pixel.
+    #[must_use]
+    pub fn samples(self, samples: Samples) -> Self {
+        self.set("samples", samples.to_string())
+    }
+
+    /// The background: a CSS colour such as `#fff`, two of them (`#fff..#dde`) for a gradient, or `transparent`.
+    #[must_use]
+    pub fn background(self, color: impl Into<String>) -> Self {
+        self.set("background", color)
+    }
+
+    /// A background through which the page behind the picture is seen.
+    #[must_use]
+    pub fn transparent(self) -> Self {
+        self.background("transparent")
+    }
+}
+
+/// The camera.
+impl Spec {
+    /// A named direction to look from.
+    #[must_use]
+    pub fn view(self, view: NamedView) -> Self {
+        self.set("view", word_for(view))
+    }
+
+    /// Another direction: degrees around the model, from its front to its right, and degrees above the ground.
+    #[must_use]
+    pub fn direction(self, azimuth_deg: f64, elevation_deg: f64) -> Self {
+        let azimuth = self.set("camera.azimuth_deg", azimuth_deg.to_string());
+        azimuth.set("camera.elevation_deg", elevation_deg.to_string())
+    }
+
+    /// The axis that is up, where the file is wrong about it.
+    #[must_use]
+    pub fn up(self, axis: UpAxis) -> Self {
+        self.set("up", word_for(axis))
+    }
+
+    /// A view in which distant objects are not smaller.
+    #[must_use]
+    pub fn orthographic(self) -> Self {
+        self.set("camera.projection", word_for(ProjectionKind::Orthographic))
+    }
+
+    /// The free border around the mesh, a share of the picture.
+    #[must_use]
+    pub fn margin(self, share: f64) -> Self {
+        self.set("camera.margin", share.to_string())
+    }
+}
+
+/// Surface and lines.
+impl Spec {
+    /// The colour of surfaces that have none of their own: a CSS colour.
+    #[must_use]
+    pub fn surface_color(self, color: impl Into<String>) -> Self {
+        self.set("surface.color", color)
+    }
+
+    /// The opacity of surfaces, 0 to 1.
+    #[must_use]
+    pub fn opacity(self, opacity: f32) -> Self {
+        self.set("surface.opacity", opacity.to_string())
+    }
+
+    /// The full width of lines, pixels.
+    #[must_use]
+    pub fn line_width(self, width_px: f32) -> Self {
+        self.set("wire.thickness", width_px.to_string())
+    }
+
+    /// The colour of lines: a CSS colour.
+    #[must_use]
+    pub fn line_color(self, color: impl Into<String>) -> Self {
+        self.set("wire.color", color)
+    }
+
+    /// The edges that lines follow.
+    #[must_use]
+    pub fn edges(self, edges: WireEdges) -> Self {
+        self.set("wire.edges", word_for(edges))
+    }
+
+    /// What becomes of lines behind a surface.
+    #[must_use]
+    pub fn hidden_lines(self, hidden: Hidden) -> Self {
+        self.set("wire.hidden", word_for(hidden))
+    }
+}
+
+/// The request document.
 impl Spec {
     /// A spec from a request document in JSON.
-    pub fn from_json(document: &str) -> Result<Self, Error> {
-        Self { document: Some(document.as_bytes().to_vec()), overrides: Vec::new() }.checked()
+    pub fn from_json(document: &str) -> Self {
+        Self { document: Some(document.as_bytes().into()), ..Self::default() }
     }
 
-    /// The same with a key of the request document set: a dotted name such as `wire.color`, and its
-    /// value as text. Later keys override earlier ones.
-    pub fn set(&self, key: &str, value: &str) -> Result<Self, Error> {
-        let mut spec = self.clone();
-        spec.overrides.push((key.to_owned(), value.to_owned()));
-        spec.checked()
+    /// Sets a key of the request document: a dotted name such as `wire.color`, and its value as text.
+    #[must_use]
+    pub fn set(mut self, key: impl Into<String>, value: impl Into<String>) -> Self {
+        self.keys.push((key.into(), value.into()));
+        self.read = Arc::default();
+        self
     }
 
-    /// The same with another picture size, pixels.
-    pub fn size_px(&self, width_px: u32, height_px: u32) -> Result<Self, Error> {
-        self.set("size", &format!("{width_px}x{height_px}"))
-    }
-
-    fn checked(self) -> Result<Self, Error> {
-        self.understood()?;
-        Ok(self)
+    /// Refuses unknown keys and values that are out of range under these limits. Drawing does so, too, under the limits of
+    /// its renderer.
+    pub fn check(&self, limits: &Limits) -> Result<(), Error> {
+        self.understood(limits).map(|_| ())
     }
 
     /// The spec that the pipeline knows: defaults filled in, every value in range.
-    pub(crate) fn understood(&self) -> Result<spec::Spec, Error> {
-        let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
-        Ok(request::read(self.document.as_deref(), &self.overrides, &rules)?)
+    pub(crate) fn understood(&self, limits: &Limits) -> Result<spec::Spec, Error> {
+        let defaults = Limits::default();
+        let are_defaults = (limits.image_px, limits.json_depth) == (defaults.image_px, defaults.json_depth);
+        if let Some(read) = self.read.get().filter(|_| are_defaults) {
+            return Ok(read.clone());
+        }
+        let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
+        let read = request::read(self.document.as_deref(), &self.keys, &rules)?;
+        if are_defaults {
+            let _ = self.read.set(read.clone());
+        }
+        Ok(read)
+    }
+}
+
+impl PartialEq for Spec {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.document, &self.keys) == (&other.document, &other.keys)
     }
 }
 
@@ -107,8 +237,62 @@ mod tests {
         let styles = all();
         assert_eq!(styles.len(), words.len());
         for (style, word) in styles.iter().zip(words) {
-            assert_eq!(style.overrides[0].1, *word);
-            style.understood().unwrap();
+            assert_eq!(style.keys[0].1, *word);
+            style.check(&Limits::default()).unwrap();
         }
+    }
+
+    #[test]
+    fn setters_say_what_their_keys_say() {
+        let typed = Spec::wire()
+            .size(80, 60)
+            .samples(Samples::Adaptive)
+            .background("#fff..#dde")
+            .view(NamedView::Top)
+            .direction(12.5, -7.0)
+            .up(UpAxis::NegZ)
+            .orthographic()
+            .margin(0.125)
+            .surface_color("#123")
+            .opacity(0.5)
+            .line_width(1.1)
+            .line_color("#a00")
+            .edges(WireEdges::Feature)
+            .hidden_lines(Hidden::Fade);
+        let document = r##"{
+            "style": "wire", "surface": { "color": "#123", "opacity": 0.5 },
+            "image": { "width": 80, "height": 60, "samples": "adaptive", "background": "#fff..#dde" },
+            "camera": { "view": "top", "azimuth_deg": 12.5, "elevation_deg": -7, "up": "-z",
+                        "projection": "orthographic", "margin": 0.125 },
+            "wire": { "thickness": 1.1, "color": "#a00", "edges": "feature", "hidden": "fade" }
+        }"##;
+        let limits = Limits::default();
+        assert_eq!(typed.understood(&limits).unwrap(), Spec::from_json(document).understood(&limits).unwrap());
+        let clear = Spec::auto().transparent().understood(&limits).unwrap();
+        assert_eq!(clear, Spec::auto().set("background", "transparent").understood(&limits).unwrap());
+    }
+
+    #[test]
+    fn a_spec_is_read_once_and_again_after_a_change() {
+        let spec = Spec::flat().size(8, 8);
+        assert!(spec.read.get().is_none());
+        spec.check(&Limits::default()).unwrap();
+        assert!(spec.read.get().is_some());
+        let larger = spec.clone().size(16, 16);
+        assert_eq!(larger.understood(&Limits::default()).unwrap().image.width_px, 16);
+        assert_eq!(spec.understood(&Limits::default()).unwrap().image.width_px, 8);
+    }
+
+    #[test]
+    fn limits_count_when_the_spec_is_understood() {
+        let mut limits = Limits::default();
+        limits.image_px = 64;
+        limits.json_depth = 2;
+        let spec = Spec::flat().size(128, 128);
+        spec.check(&Limits::default()).unwrap();
+        assert!(spec.check(&limits).unwrap_err().to_string().contains("64"));
+        let deep = Spec::from_json(r#"{ "camera": { "eye": [1, 2, 3] } }"#);
+        deep.check(&Limits::default()).unwrap();
+        deep.check(&limits).unwrap_err();
     }
 }

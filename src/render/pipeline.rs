@@ -7,7 +7,11 @@
 //! Invariant: nothing from here down reads a file or the environment, or knows an async runtime. A
 //! clock is read to time the stages of drawing, and nothing depends on it.
 
-use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes, GpuDevice};
+mod faces;
+
+pub use faces::{FaceBuffer, find_faces};
+
+use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes};
 use crate::caption::{Scale, draw_legend};
 use crate::encode::{self, EncodeError};
 use crate::image::{Image, ImageFormat, RowSink};
@@ -17,9 +21,21 @@ use crate::mesh::Mesh;
 use crate::plan::{self, DrawPlan, Prepared, Skip, UvLayout};
 pub use crate::plan::{PlanError, QualitySelection};
 use crate::scene::{Scene, SceneError};
-use crate::sheet::{self, Canvas, Layout};
+use crate::sheet::{self, Canvas, Cell, Layout};
 use crate::spec::{Sheet, Spec};
 use crate::warning::Warning;
+
+/// What a picture is drawn with, and what it may cost.
+pub struct Context<'a> {
+    /// The back-ends.
+    pub backends: &'a mut Backends,
+    /// The memory that is left.
+    pub budget: Budget,
+    /// A flag that ends the work.
+    pub deadline: &'a Deadline,
+    /// Called at the end of each stage, so that the caller can keep the time.
+    pub ended: &'a mut dyn FnMut(Stage),
+}
 
 /// Turns the bytes of a mesh into the bytes of a picture.
 ///
@@ -41,18 +57,11 @@ pub fn render(
     drop(bundle);
     ended(Stage::Parse);
 
-    render_model(&model, spec, backends, &mut budget, deadline, ended)
+    render_model(&model, spec, Context { backends, budget, deadline, ended })
 }
 
 /// Turns a mesh that is in memory already into the bytes of a picture.
-pub fn render_model(
-    model: &Model,
-    spec: &Spec,
-    backends: &mut Backends,
-    budget: &mut Budget,
-    deadline: &Deadline,
-    ended: &mut dyn FnMut(Stage),
-) -> Result<Output, RenderError> {
+pub fn render_model(model: &Model, spec: &Spec, mut cx: Context<'_>) -> Result<Output, RenderError> {
     // Mesh -> Scene -> DrawPlan -> Image
     let format = spec.image.format.unwrap_or(ImageFormat::Png);
     let animated = spec.sheet.as_ref().filter(|sheet| sheet.is_animated(format));
@@ -63,82 +72,86 @@ pub fn render_model(
         true => encode::row_encoder(format, effort, size_px, spec.image.background.is_opaque()),
         false => None,
     };
-    let drawn = match &spec.sheet {
-        Some(sheet) => draw_sheet(model, (sheet, animated.is_some()), spec, backends, budget, deadline, ended)?,
-        None => {
-            let sink = rows.as_mut().map(|rows| rows as &mut dyn RowSink);
-            draw_view(model.view(), spec, sink, backends, budget, deadline, ended)?
-        }
+    let Drawn { image, mut report } = match &spec.sheet {
+        Some(sheet) => draw_sheet(model.view(), (sheet, animated.is_some()), spec, &mut cx)?,
+        None => draw_view(model.view(), spec, rows.as_mut().map(|rows| rows as &mut dyn RowSink), &mut cx)?,
     };
 
     // Image -> bytes
     let bytes = match (animated, rows) {
-        (Some(sheet), _) => encode::encode_animation(&drawn.image, sheet.count(), format, effort, deadline)?,
-        (None, Some(rows)) => rows.finish(&drawn.image)?,
-        (None, None) => encode::encode(&drawn.image, format, effort, deadline)?,
+        (Some(sheet), _) => encode::encode_animation(&image, sheet.count(), format, effort, cx.deadline)?,
+        (None, Some(rows)) => rows.finish(&image)?,
+        (None, None) => encode::encode(&image, format, effort, cx.deadline)?,
     };
-    ended(Stage::Encode);
+    (cx.ended)(Stage::Encode);
 
-    let mut warnings = [model.warnings.clone(), drawn.warnings].concat();
+    let mut warnings = [model.warnings.clone(), report.warnings].concat();
     if spec.camera.has_own_up() {
         warnings.retain(|warning| warning.code != import::up_axis::CODE);
     }
-    let Drawn { backend, is_substitute, draw_times, skips, short_chains, selection, .. } = drawn;
-    Ok(Output { bytes, format, backend, is_substitute, draw_times, skips, short_chains, warnings, selection })
+    report.warnings = warnings;
+    Ok(Output { bytes, format, report })
 }
 
 /// Draws a mesh that is in memory already, as often as wanted. A turntable becomes a grid of its views.
-pub fn draw(
-    model: &Model,
-    spec: &Spec,
-    backends: &mut Backends,
-    budget: &mut Budget,
-    deadline: &Deadline,
-    ended: &mut dyn FnMut(Stage),
-) -> Result<Drawn, RenderError> {
+pub fn draw(model: &Model, spec: &Spec, mut cx: Context<'_>) -> Result<Drawn, RenderError> {
     match &spec.sheet {
-        Some(sheet) => draw_sheet(model, (sheet, false), spec, backends, budget, deadline, ended),
-        None => draw_view(model.view(), spec, None, backends, budget, deadline, ended),
+        Some(sheet) => draw_sheet(model.view(), (sheet, false), spec, &mut cx),
+        None => draw_view(model.view(), spec, None, &mut cx),
     }
 }
 
 /// Draws all views of a sheet: into a grid, or else as the frames of an animation, from top to bottom.
 fn draw_sheet(
-    model: &Model,
+    view: View<'_>,
     (sheet, is_animated): (&Sheet, bool),
     spec: &Spec,
-    backends: &mut Backends,
-    budget: &mut Budget,
-    deadline: &Deadline,
-    ended: &mut dyn FnMut(Stage),
+    cx: &mut Context<'_>,
 ) -> Result<Drawn, RenderError> {
     let layout = Layout::new(sheet, &spec.image, is_animated);
-    let mut canvas = Canvas::new(layout, budget).map_err(PlanError::Limit)?;
-    let mut all: Option<Drawn> = None;
+    let draw = |cell: Option<&Cell>, cx: &mut Context<'_>| {
+        let of_cell = match cell {
+            Some(cell) => sheet::cell_spec(spec, sheet, cell),
+            None => Spec { sheet: None, ..spec.clone() },
+        };
+        draw_view(view, &of_cell, None, cx)
+    };
+    draw_cells(layout, cx, draw, |view| sheet.labels.then(|| sheet::label(sheet, view)))
+}
+
+/// Draws the cells of a layout one after the other into one picture, each within the memory that is left, and writes the
+/// label of each view into its cell. `draw` is called without a cell where the picture has no room for any: what is known
+/// of that drawing is reported, and its image is dropped.
+pub fn draw_cells(
+    layout: Layout,
+    cx: &mut Context<'_>,
+    mut draw: impl FnMut(Option<&Cell>, &mut Context<'_>) -> Result<Drawn, RenderError>,
+    label: impl Fn(u32) -> Option<String>,
+) -> Result<Drawn, RenderError> {
+    let mut canvas = Canvas::new(layout, &mut cx.budget).map_err(PlanError::Limit)?;
+    let mut all: Option<DrawReport> = None;
     for cell in layout.cells().filter(|cell| !cell.size_px.contains(&0)) {
-        deadline.check()?;
-        // What a view takes is free again before the next.
-        let mut of_cell = budget.clone();
-        let of_view = sheet::cell_spec(spec, sheet, &cell);
-        let drawn = draw_view(model.view(), &of_view, None, backends, &mut of_cell, deadline, ended)?;
+        cx.deadline.check()?;
+        // What a cell takes is free again before the next.
+        let budget = cx.budget.clone();
+        let Context { backends, deadline, ended, .. } = cx;
+        let mut of_cell = Context { backends: &mut **backends, budget, deadline, ended: &mut **ended };
+        let drawn = draw(Some(&cell), &mut of_cell)?;
         canvas.paste(&cell, &drawn.image);
         let Some(view) = cell.view else { continue };
-        if sheet.labels {
-            canvas.write(&cell, &sheet::label(sheet, view));
+        if let Some(label) = label(view) {
+            canvas.write(&cell, &label);
         }
         match &mut all {
-            Some(all) => all.add(drawn),
-            None => all = Some(drawn),
+            Some(all) => all.add(drawn.report),
+            None => all = Some(drawn.report),
         }
     }
-    let mut all = match all {
+    let report = match all {
         Some(all) => all,
-        None => {
-            draw_view(model.view(), &Spec { sheet: None, ..spec.clone() }, None, backends, budget, deadline, ended)?
-        }
+        None => draw(None, cx)?.report,
     };
-    all.image = canvas.finish();
-    Ok(all)
+    Ok(Drawn { image: canvas.finish(), report })
 }
 
 /// Draws one view.
@@ -146,83 +159,102 @@ pub fn draw_view(
     view: View<'_>,
     spec: &Spec,
     sink: Option<&mut dyn RowSink>,
-    backends: &mut Backends,
+    cx: &mut Context<'_>,
+) -> Result<Drawn, RenderError> {
+    let Context { backends, budget, deadline, ended } = cx;
+    let has_gpu = backends.has_gpu();
+    with_scene(view, spec, has_gpu, budget, deadline, |staged, budget| {
+        let Staged { scene, prepared, mut warnings, selection, .. } = staged;
+        // Scene -> DrawPlan
+        let plan = plan::build_from(&scene, prepared, budget, deadline)?;
+        let bands_bytes = backends.bands_bytes(scene.spec.backend, &plan);
+        budget.spend("bands of the picture", bands_bytes, 1).map_err(PlanError::Limit)?;
+        ended(Stage::Plan);
+
+        // DrawPlan -> Image
+        let mut drawn = backends.draw(scene.spec.backend, &plan, sink, deadline)?;
+        if scene.spec.image.legend {
+            let legends = plan.legends.iter();
+            let scales = legends.map(|plan::Legend { title, ends, colors }| Scale { title, ends: *ends, colors });
+            draw_legend(&mut drawn.image, &scales.collect::<Vec<_>>());
+        }
+        ended(Stage::Render);
+
+        let of_layout = std::mem::take(&mut warnings.of_layout);
+        let mut all: Vec<Warning> = plan::unknown_materials(&scene).into_iter().collect();
+        all.append(&mut warnings.of_selection);
+        all.extend(plan::undrawn_primitives(&scene));
+        all.extend(plan::out_of_view(&plan));
+        all.extend(plan.warnings.iter().cloned().chain(of_layout));
+        let (skips, short_chains) = (plan.skips, plan.short_chains);
+        let Chosen { image, backend, draw_times, is_substitute } = drawn;
+        let report = DrawReport { backend, is_substitute, draw_times, skips, short_chains, warnings: all, selection };
+        Ok(Drawn { image, report })
+    })
+}
+
+/// A scene before it is planned, and what led to it.
+pub struct Staged<'v, 's> {
+    /// The scene.
+    pub scene: Scene<'v, 's>,
+    /// True if the mesh of the scene is the layout of its texture, and not the mesh itself.
+    pub is_uv_layout: bool,
+    prepared: &'v Prepared,
+    warnings: StagingWarnings,
+    selection: Option<QualitySelection>,
+}
+
+/// Warnings of what precedes the plan.
+#[derive(Default)]
+struct StagingWarnings {
+    of_selection: Vec<Warning>,
+    of_layout: Vec<Warning>,
+}
+
+/// The recipe for a scene: the request with the quality that is selected for its target, the mesh or the layout of its
+/// texture, and the camera that frames it.
+pub fn with_scene<R>(
+    view: View<'_>,
+    spec: &Spec,
+    has_gpu: bool,
     budget: &mut Budget,
     deadline: &Deadline,
-    ended: &mut dyn FnMut(Stage),
-) -> Result<Drawn, RenderError> {
-    // Mesh -> Scene -> DrawPlan
+    then: impl FnOnce(Staged<'_, '_>, &mut Budget) -> Result<R, RenderError>,
+) -> Result<R, RenderError> {
     let layout = UvLayout::of(view.mesh, spec, budget, deadline)?;
     let of_layout = Prepared::default();
     let (mesh, spec, prepared) = match &layout {
         Some(layout) => (&layout.mesh, &layout.spec, &of_layout),
         None => (view.mesh, spec, view.prepared),
     };
-    let selected = plan::select_quality(spec, mesh.triangles.len(), backends.has_gpu());
+    let selected = plan::select_quality(spec, mesh.triangles.len(), has_gpu);
     let spec = selected.as_ref().map_or(spec, |selected| &selected.spec);
-    let framing = plan::framing(mesh, spec, prepared, budget, deadline)?;
+    let framing = match view.framing {
+        Some(_) => None,
+        None => plan::framing(mesh, spec, prepared, budget, deadline)?,
+    };
     let fitted = view.framing.or(framing.as_deref()).unwrap_or(&mesh.positions);
     let scene = Scene::framed_by(fitted, mesh, spec, budget)?;
-    let plan = plan::build_from(&scene, prepared, budget, deadline)?;
-    let bands_bytes = backends.bands_bytes(spec.backend, &plan);
-    budget.spend("bands of the picture", bands_bytes, 1).map_err(PlanError::Limit)?;
-    ended(Stage::Plan);
-
-    // DrawPlan -> Image
-    let mut drawn = backends.draw(spec.backend, &plan, sink, deadline)?;
-    if spec.image.legend {
-        let legends = plan.legends.iter();
-        let scales = legends.map(|plan::Legend { title, ends, colors }| Scale { title, ends: *ends, colors });
-        draw_legend(&mut drawn.image, &scales.collect::<Vec<_>>());
-    }
-    ended(Stage::Render);
-
-    let mut warnings: Vec<Warning> = plan::unknown_materials(&scene).into_iter().collect();
-    warnings.extend(selected.iter().flat_map(|selected| selected.warnings.iter().cloned()));
-    warnings.extend(plan::undrawn_primitives(&scene));
-    warnings.extend(plan::out_of_view(&plan));
-    warnings.extend(plan.warnings.iter().chain(layout.iter().flat_map(|layout| &layout.warnings)).cloned());
+    let warnings = StagingWarnings {
+        of_selection: selected.as_ref().map(|selected| selected.warnings.clone()).unwrap_or_default(),
+        of_layout: layout.as_ref().map(|layout| layout.warnings.clone()).unwrap_or_default(),
+    };
     let selection = selected.as_ref().map(|selected| selected.selection.clone());
-    let (skips, short_chains) = (plan.skips, plan.short_chains);
-    let Chosen { image, backend, draw_times, is_substitute } = drawn;
-    Ok(Drawn { image, backend, is_substitute, draw_times, skips, short_chains, warnings, selection })
+    then(Staged { scene, is_uv_layout: layout.is_some(), prepared, warnings, selection }, budget)
 }
 
-/// Makes what a picture needs on a device and can be made without drawing, such as pipelines.
-pub fn make_ready(
-    model: &Model,
-    spec: &Spec,
-    device: &dyn GpuDevice,
-    budget: &mut Budget,
-    deadline: &Deadline,
-) -> Result<(), RenderError> {
-    let make = |plan: &DrawPlan<'_>| Ok(device.make_ready(plan)?);
-    with_plan(model, spec, budget, deadline, make)
-}
-
-/// The same for a picture that is drawn together with others while the device is busy.
-pub fn make_ready_for_load(
-    model: &Model,
-    spec: &Spec,
-    device: &dyn GpuDevice,
-    budget: &mut Budget,
-    deadline: &Deadline,
-) -> Result<(), RenderError> {
-    let make = |plan: &DrawPlan<'_>| Ok(device.make_ready_for_load(plan)?);
-    with_plan(model, spec, budget, deadline, make)
-}
-
-fn with_plan(
+/// Plans a picture and gives the plan away before anything is drawn, for devices that make ready ahead what pictures
+/// need, such as pipelines.
+pub fn with_plan(
     model: &Model,
     spec: &Spec,
     budget: &mut Budget,
     deadline: &Deadline,
-    then: impl FnOnce(&DrawPlan<'_>) -> Result<(), RenderError>,
+    then: impl FnOnce(&DrawPlan<'_>) -> Result<(), DrawError>,
 ) -> Result<(), RenderError> {
-    let Model { mesh, prepared, .. } = model;
-    let framing = plan::framing(mesh, spec, prepared, budget, deadline)?;
-    let scene = Scene::framed_by(framing.as_deref().unwrap_or(&mesh.positions), mesh, spec, budget)?;
-    then(&plan::build_from(&scene, prepared, budget, deadline)?)
+    with_scene(model.view(), spec, true, budget, deadline, |staged, budget| {
+        Ok(then(&plan::build_from(&staged.scene, staged.prepared, budget, deadline)?)?)
+    })
 }
 
 /// A mesh in memory: imported once, and drawn as often as wanted. What one picture finds out about
@@ -265,7 +297,8 @@ impl Model {
         &self.mesh
     }
 
-    fn view(&self) -> View<'_> {
+    /// The mesh as it is drawn, with the camera fitted to it.
+    pub fn view(&self) -> View<'_> {
         View { mesh: &self.mesh, prepared: &self.prepared, framing: None }
     }
 
@@ -299,20 +332,8 @@ pub struct Output {
     pub bytes: Vec<u8>,
     /// The picture's format.
     pub format: ImageFormat,
-    /// The back-end that drew it.
-    pub backend: BackendKind,
-    /// True if the CPU drew it because a GPU that was chosen could not.
-    pub is_substitute: bool,
-    /// The durations of the stages of drawing, as far as the back-end times them.
-    pub draw_times: DrawTimes,
-    /// The parts of drawing that the plan leaves out, with reasons.
-    pub skips: Vec<Skip>,
-    /// Chains of outlines that the plan leaves out because they are short.
-    pub short_chains: u32,
-    /// Faults that the importer noticed, and parts of the request that do not go with the mesh.
-    pub warnings: Vec<Warning>,
-    /// The values selected for a request with a quality target; None for other requests.
-    pub selection: Option<QualitySelection>,
+    /// The way it was drawn, with the warnings of its mesh.
+    pub report: DrawReport,
 }
 
 /// The output of [`draw`].
@@ -320,6 +341,13 @@ pub struct Output {
 pub struct Drawn {
     /// The picture.
     pub image: Image,
+    /// The way it was drawn.
+    pub report: DrawReport,
+}
+
+/// The way a picture was drawn.
+#[derive(Debug)]
+pub struct DrawReport {
     /// The back-end that drew it.
     pub backend: BackendKind,
     /// True if the CPU drew it because a GPU that was chosen could not.
@@ -336,9 +364,9 @@ pub struct Drawn {
     pub selection: Option<QualitySelection>,
 }
 
-impl Drawn {
+impl DrawReport {
     /// Adds what there is to say about another view of the same mesh.
-    pub fn add(&mut self, other: Self) {
+    fn add(&mut self, other: Self) {
         if other.backend == BackendKind::Cpu {
             self.backend = BackendKind::Cpu;
         }
@@ -365,6 +393,8 @@ pub enum Stage {
     Render,
     /// Image to bytes.
     Encode,
+    /// Meshes to a verdict, or to a difference.
+    Judge,
 }
 
 impl Stage {
@@ -375,6 +405,7 @@ impl Stage {
             Self::Plan => "plan",
             Self::Render => "render",
             Self::Encode => "encode",
+            Self::Judge => "judge",
         }
     }
 }

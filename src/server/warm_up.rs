@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 use meshsnap_render::backend::{Backends, DrawError, GpuDevice, GpuHost, GpuKind};
 use meshsnap_render::import::Bundle;
 use meshsnap_render::limits::{Budget, Deadline, Limits};
-use meshsnap_render::pipeline::{self, Model};
+use meshsnap_render::pipeline::{self, Context, Model};
+use meshsnap_render::plan::DrawPlan;
 use meshsnap_render::request::{self, Rules, Style};
 use meshsnap_render::spec::words::Words as _;
 use meshsnap_render::spec::{BackendChoice, Spec};
@@ -91,8 +92,9 @@ fn warm(gpu: Arc<GpuHost>, deadline: &Deadline) {
         if deadline.check().is_err() || !gpu.may_have_hardware() {
             return;
         }
-        let drawn = pipeline::draw(model, spec, &mut backends, &mut Budget::new(&limits), deadline, &mut |_| ());
-        if let Err(error) = drawn {
+        let budget = Budget::new(&limits);
+        let context = Context { backends: &mut backends, budget, deadline, ended: &mut |_| () };
+        if let Err(error) = pipeline::draw(model, spec, context) {
             tracing::debug!(style, %error, "a style was not warmed up");
         }
     }
@@ -108,7 +110,10 @@ fn prepare_for_load(gpu: &GpuHost, models: &[Model], specs: &[(&str, Spec)], lim
         if deadline.check().is_err() || device.lost().is_some() {
             break;
         }
-        let made = || pipeline::make_ready_for_load(model, spec, &*device, &mut Budget::new(limits), deadline);
+        let made = || {
+            let make = |plan: &DrawPlan<'_>| device.make_ready_for_load(plan);
+            pipeline::with_plan(model, spec, &mut Budget::new(limits), deadline, make)
+        };
         // wgpu may panic on a lost device.
         if let Ok(Err(error)) = catch_unwind(AssertUnwindSafe(made)) {
             tracing::debug!(style, %error, "a style's pipelines for load were not made ahead");
@@ -130,7 +135,10 @@ fn make_ready(
 ) -> Result<(), DrawError> {
     let samples = specs.first().map_or(1, |(_, spec)| spec.image.samples.per_pixel());
     let make = &|device: &Arc<dyn GpuDevice>, style: &str, spec: &Spec| {
-        let made = || pipeline::make_ready(model, spec, &**device, &mut Budget::new(limits), deadline);
+        let made = || {
+            let make = |plan: &DrawPlan<'_>| device.make_ready(plan);
+            pipeline::with_plan(model, spec, &mut Budget::new(limits), deadline, make)
+        };
         // wgpu may panic on a lost device.
         if let Ok(Err(error)) = catch_unwind(AssertUnwindSafe(made)) {
             tracing::debug!(style, %error, "a style's pipelines were not made ahead");

@@ -124,7 +124,7 @@ impl Batch<'_> {
         })?;
         let drawn = drawn.map_err(|error| one::of_mesh(error, &task.mesh, &|| advice(task, &unread)))?;
         self.write(task, &drawn, &names, shared)?;
-        said.extend(one::warnings(&task.mesh, &drawn.warnings, &|| advice(task, &unread)));
+        said.extend(one::warnings(&task.mesh, &drawn.report.warnings, &|| advice(task, &unread)));
         Ok(())
     }
 

@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use meshsnap_render::backend::GpuStatus;
-use meshsnap_render::pipeline::{Output, Stage};
+use meshsnap_render::pipeline::{DrawReport, Stage};
 
 /// Prints what `--explain` asks for.
-pub fn explain(output: &Output, gpu: &GpuStatus, read: Duration, times: &[(Stage, Duration)], total: Duration) {
-    say!("drawn by {}", output.backend.name());
-    if let Some(selection) = &output.selection {
+pub fn explain(report: &DrawReport, gpu: &GpuStatus, read: Duration, times: &[(Stage, Duration)], total: Duration) {
+    say!("drawn by {}", report.backend.name());
+    if let Some(selection) = &report.selection {
         let (error, time_ms) = (selection.expected_error, selection.expected_time_ms);
         say!("chosen: {selection}; expected error {error}/255, expected time {time_ms} ms");
     }
@@ -18,21 +18,21 @@ pub fn explain(output: &Output, gpu: &GpuStatus, read: Duration, times: &[(Stage
     });
     let parts = [Some(gpu.state.name().to_owned()), device, gpu.reason.clone()];
     say!("gpu: {}", parts.into_iter().flatten().collect::<Vec<_>>().join("; "));
-    for skip in &output.skips {
+    for skip in &report.skips {
         say!("skipped {}: {}", skip.kind, skip.why);
     }
-    if output.draw_times.mixed_pixels > 0 {
+    if report.draw_times.mixed_pixels > 0 {
         let why = "faces that differ in colour meet near them";
-        say!("mixed pixels, drawn from 64 or 256 points each because {why}: {}", output.draw_times.mixed_pixels);
+        say!("mixed pixels, drawn from 64 or 256 points each because {why}: {}", report.draw_times.mixed_pixels);
     }
-    if output.short_chains > 0 {
-        say!("lines left out, shorter than wire.min_length or outline.min_length: {}", output.short_chains);
+    if report.short_chains > 0 {
+        say!("lines left out, shorter than wire.min_length or outline.min_length: {}", report.short_chains);
     }
     say!("{:<6} {:9.3} ms", "read", read.as_secs_f64() * 1e3);
     for (stage, took) in times {
         say!("{:<6} {:9.3} ms", format!("{stage:?}").to_lowercase(), took.as_secs_f64() * 1e3);
         if *stage == Stage::Render {
-            for (part, took) in output.draw_times.parts() {
+            for (part, took) in report.draw_times.parts() {
                 say!("  {:<12} {:9.3} ms", part.name(), took.as_secs_f64() * 1e3);
             }
         }

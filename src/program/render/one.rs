@@ -77,14 +77,14 @@ impl Drawing<'_> {
         })?;
 
         self.destination.write(&arguments.output, &output.bytes)?;
-        for sentence in warnings(mesh_name, &output.warnings, &beside) {
+        for sentence in warnings(mesh_name, &output.report.warnings, &beside) {
             say!("meshsnap: {sentence}");
         }
         for sentence in bundle::unused(&paths, &file_use, |path| archives.iter().any(|archive| archive == path)) {
             say!("meshsnap: {sentence}");
         }
         if arguments.explain {
-            explain(&output, &gpu.status(), read, &times, began.elapsed());
+            explain(&output.report, &gpu.status(), read, &times, began.elapsed());
         }
         Ok(())
     }
@@ -149,7 +149,7 @@ pub fn warnings(mesh_name: &str, all: &[Warning], advice: &dyn Fn() -> Option<(S
 /// The name of the step that follows a stage, for the spinner.
 fn after(stage: Stage) -> &'static str {
     match stage {
-        Stage::Parse => "planning",
+        Stage::Parse | Stage::Judge => "planning",
         Stage::Plan => "drawing",
         Stage::Render => "encoding",
         Stage::Encode => "writing",

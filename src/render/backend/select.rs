@@ -53,6 +53,11 @@ impl Backends {
         self.host.is_eligible()
     }
 
+    /// The renderer on the CPU.
+    pub fn on_cpu(&mut self) -> &mut cpu::CpuRenderer {
+        &mut self.cpu
+    }
+
     /// Draws the plan on the back-end that `choice` means here and now. Gives rows to `sink` as
     /// [`Renderer::draw_rows`] does.
     pub fn draw(

@@ -21,7 +21,7 @@ use meshsnap_render::backend::{BackendKind, DrawTimes};
 use meshsnap_render::image::ImageFormat;
 use meshsnap_render::import::{Bundle, Format};
 use meshsnap_render::limits::{Deadline, Lender};
-use meshsnap_render::pipeline::{Output, QualitySelection, RenderError, Stage};
+use meshsnap_render::pipeline::{DrawReport, Output, QualitySelection, RenderError, Stage};
 use meshsnap_render::spec::Spec;
 use meshsnap_render::warning::Warning;
 
@@ -229,7 +229,8 @@ pub struct Finished {
 impl Finished {
     /// Takes over the pipeline's output.
     pub fn new(output: Output, timings: Timings) -> Self {
-        let Output { bytes, format, backend, is_substitute, draw_times, warnings, selection, .. } = output;
+        let Output { bytes, format, report } = output;
+        let DrawReport { backend, is_substitute, draw_times, warnings, selection, .. } = report;
         Self {
             content: bytes.into(),
             memory: None,
@@ -331,7 +332,7 @@ pub struct Timings {
     pub parse: Duration,
     /// Mesh and spec to plan.
     pub plan: Duration,
-    /// Plan to image.
+    /// Plan to image, or meshes to verdict.
     pub render: Duration,
     /// Image to bytes.
     pub encode: Duration,
@@ -343,7 +344,7 @@ impl Timings {
         *match stage {
             Stage::Parse => &mut self.parse,
             Stage::Plan => &mut self.plan,
-            Stage::Render => &mut self.render,
+            Stage::Render | Stage::Judge => &mut self.render,
             Stage::Encode => &mut self.encode,
         } += took;
     }

@@ -22,7 +22,7 @@ use meshsnap_render::backend::{Backends, GpuHost};
 use meshsnap_render::encode::EncodeError;
 use meshsnap_render::import::{self, Bundle, MeshError, bundle::UNNAMED};
 use meshsnap_render::limits::{Budget, Deadline, Lender, Limits};
-use meshsnap_render::pipeline::{self, Model, Output, RenderError, Stage};
+use meshsnap_render::pipeline::{self, Context, Model, Output, RenderError, Stage};
 
 /// A worker's renderer, which does one job after the other.
 pub type Renderer = Box<dyn FnMut(&Work, &Deadline, &mut dyn FnMut(Stage)) -> Result<Product, RenderError>>;
@@ -104,8 +104,9 @@ fn render_stored(
     ended(Stage::Parse);
     // A mesh that is kept has a share of its own.
     let counted = if resident.is_counted() { resident.budget.spent_bytes() } else { 0 };
-    let mut budget = resident.budget.lent_by(&limits.lender, counted);
-    let output = pipeline::render_model(&resident.model, job.spec, backends, &mut budget, deadline, ended);
+    let budget = resident.budget.lent_by(&limits.lender, counted);
+    let context = Context { backends, budget, deadline, ended };
+    let output = pipeline::render_model(&resident.model, job.spec, context);
     residents.weigh(&key, &resident);
     Ok((output?, was_kept))
 }
@@ -134,7 +135,7 @@ fn judge(
         Ok(checks) => checks,
         Err(error) => vec![check::of_unreadable(&error).ok_or(error)?],
     };
-    ended(Stage::Render);
+    ended(Stage::Judge);
     let verdict = Verdict::new(path, Some(checking.digest.to_string()), checks);
     Ok(Product::Verdict { has_failed: checking.may_fail && !verdict.ok, json: written(verdict.json())? })
 }
@@ -157,11 +158,11 @@ fn compare(
     ended(Stage::Parse);
     let compared = a.diff(&b, *max_distance, deadline)?;
     let Some(spec) = picture else {
-        ended(Stage::Render);
+        ended(Stage::Judge);
         let has_failed = *may_fail && !compared.difference.same;
         return Ok(Product::Verdict { has_failed, json: written(compared.difference.json())? });
     };
-    ended(Stage::Plan);
+    ended(Stage::Judge);
     let output = opened::render_difference([&a, &b], &compared, spec, backends, deadline, ended)?;
     Ok(Product::Picture { output: Box::new(output), mesh_was_kept: false })
 }

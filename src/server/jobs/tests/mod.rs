@@ -15,7 +15,7 @@ use meshsnap_render::backend::{BackendKind, DrawTimes};
 use meshsnap_render::image::ImageFormat;
 use meshsnap_render::import::Bundle;
 use meshsnap_render::limits::{Deadline, Lender, Stopped};
-use meshsnap_render::pipeline::{Output, RenderError, Stage};
+use meshsnap_render::pipeline::{DrawReport, Output, RenderError, Stage};
 use meshsnap_render::spec::color::Rgba;
 use meshsnap_render::spec::{
     BackendChoice, CameraSpec, Ground, ImageSpec, Layers, Light, LightPreset, NamedView, Points, ProjectionKind,
@@ -108,18 +108,16 @@ fn spec() -> Spec {
 }
 
 fn output(bytes: usize) -> Output {
-    let (skips, warnings) = (Vec::new(), Vec::new());
-    Output {
-        bytes: vec![7; bytes],
-        format: ImageFormat::Png,
+    let report = DrawReport {
         backend: BackendKind::Cpu,
         is_substitute: false,
         draw_times: DrawTimes::default(),
-        skips,
+        skips: Vec::new(),
         short_chains: 0,
-        warnings,
+        warnings: Vec::new(),
         selection: None,
-    }
+    };
+    Output { bytes: vec![7; bytes], format: ImageFormat::Png, report }
 }
 
 /// The fake renderer, whose behaviour the mesh's bytes name.
