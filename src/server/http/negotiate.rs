@@ -1,4 +1,7 @@
 //! The preferences of a client: `Accept` and `Prefer`.
+//!
+//! `Accept` is read here because `headers` does not read it, and `headers-accept` differs in two ways: of forms that are liked
+//! equally it takes the client's first and not ours, and one malformed range makes it drop the header.
 
 use std::time::Duration;
 

@@ -92,7 +92,7 @@ fn by_address(request: &Request) -> Owner {
     client.map_or_else(Owner::default, |ConnectInfo(client)| Owner::new(&format!("address {}", client.address.ip())))
 }
 
-/// The token that a request carries.
+/// The token that a request carries. None if it carries two, of which the crate `headers` would take the first.
 fn bearer(headers: &HeaderMap) -> Option<&str> {
     let mut values = headers.get_all(header::AUTHORIZATION).iter();
     let value = values.next().and_then(|v| v.to_str().ok())?;
