@@ -11,8 +11,6 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 /// each can be configured.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// The largest request body that is accepted, bytes.
-    pub body_bytes: u64,
     /// Memory that one job may hold at once, bytes: mesh, plan, frame buffers.
     pub memory_bytes: u64,
     /// Triangles after triangulation and instancing.
@@ -31,10 +29,6 @@ pub struct Limits {
     pub bundle_bytes: u64,
     /// Files of one bundle. Every entry of a zip archive counts, folders too.
     pub bundle_entries: u64,
-    /// Wall-clock time for one job, from the moment at which a worker begins it to the encoded image, milliseconds.
-    pub job_ms: u64,
-    /// Jobs that wait per worker. A full queue refuses a job at once and never blocks.
-    pub queue_per_worker: u64,
     /// The owner of the memory that jobs share. None: each job has its own.
     pub lender: Lender,
 }
@@ -68,7 +62,6 @@ impl Eq for Lender {}
 impl Default for Limits {
     fn default() -> Self {
         Self {
-            body_bytes: 64 << 20,
             memory_bytes: 2 << 30,
             triangles: 10_000_000,
             nodes: 100_000,
@@ -78,8 +71,6 @@ impl Default for Limits {
             texture_total_px: 256 << 20,
             bundle_bytes: 512 << 20,
             bundle_entries: 1000,
-            job_ms: 30_000,
-            queue_per_worker: 64,
             lender: Lender(None),
         }
     }
@@ -89,7 +80,7 @@ impl Default for Limits {
 /// No setting exceeds it.
 pub const IMAGE_PX_MAX: u64 = 4096;
 
-/// The longest time that a setting can give a job, milliseconds: a day, so that no sum of times
+/// The longest time that a request or a setting can give a job, milliseconds: a day, so that no sum of times
 /// overflows.
 pub const JOB_MS_MAX: u64 = 24 * 3600 * 1000;
 

@@ -85,7 +85,7 @@ pub async fn delete(
 async fn store(state: &AppState, request: Request, wanted: Option<Digest>) -> Result<Response, ApiError> {
     let reading = Query::read_for_upload(request.uri(), &state.rules)?;
     let headers = request.headers();
-    body::check_header(headers, state.rules.limits.body_bytes)?;
+    body::check_header(headers, state.body_bytes_max)?;
     // A form's length is not the mesh's, because the form has boundaries and headers as well.
     if let Some(length) = body::announced_length(headers).filter(|_| !body::is_multipart(headers)) {
         state.meshes.check_size(length)?;
