@@ -192,8 +192,10 @@ fn run_pipeline(bytes: &[u8]) {
     let bundle = Bundle::of_one(mesh.to_vec());
     let job = Job { bundle, format_in: None, spec: &spec };
     let deadline = Deadline::default();
-    let drawn =
-        BACKENDS.with_borrow_mut(|backends| pipeline::render(job, backends, &rules.limits, &deadline, &mut |_| {}));
+    let mut budget = Budget::new(&rules.limits);
+    let drawn = BACKENDS.with_borrow_mut(|backends| {
+        pipeline::render(job, backends, &rules.limits, &mut budget, &deadline, &mut |_| {})
+    });
     match drawn {
         Ok(output) => assert!(!output.bytes.is_empty()),
         Err(RenderError::Mesh(_) | RenderError::Plan(_)) => {}

@@ -29,8 +29,6 @@ pub struct Limits {
     pub bundle_bytes: u64,
     /// Files of one bundle. Every entry of a zip archive counts, folders too.
     pub bundle_entries: u64,
-    /// The owner of the memory that jobs share. None: each job has its own.
-    pub lender: Lender,
 }
 
 /// The owner of memory that several jobs share.
@@ -42,22 +40,6 @@ pub trait Lend: std::fmt::Debug + Send + Sync {
     /// The job holds 0 bytes from now on: somebody else counts those that it has borrowed.
     fn restart(&self);
 }
-
-/// An owner of memory, or none.
-#[derive(Clone, Debug, Default)]
-pub struct Lender(pub Option<Arc<dyn Lend>>);
-
-impl PartialEq for Lender {
-    fn eq(&self, other: &Self) -> bool {
-        match (&self.0, &other.0) {
-            (Some(one), Some(other)) => Arc::ptr_eq(one, other),
-            (None, None) => true,
-            _ => false,
-        }
-    }
-}
-
-impl Eq for Lender {}
 
 impl Default for Limits {
     fn default() -> Self {
@@ -71,7 +53,6 @@ impl Default for Limits {
             texture_total_px: 256 << 20,
             bundle_bytes: 512 << 20,
             bundle_entries: 1000,
-            lender: Lender(None),
         }
     }
 }
@@ -119,7 +100,8 @@ pub struct Spent {
 pub struct Budget {
     /// A list of all that is spent while [`record`](Self::record) runs; None at other times.
     recorded: Option<Vec<Spent>>,
-    lender: Lender,
+    /// The owner of the memory that jobs share. None: each job has its own.
+    lender: Option<Arc<dyn Lend>>,
     /// Bytes that were spent before, and that the lender does not lend.
     lent_from: u64,
     spent: u64,
@@ -132,10 +114,15 @@ pub struct Budget {
 impl Budget {
     /// An unspent budget of `limits.memory_bytes`, with the limits on textures.
     pub fn new(limits: &Limits) -> Self {
-        let &Limits { memory_bytes, texture_px, texture_total_px, ref lender, .. } = limits;
+        Self::lent(limits, None)
+    }
+
+    /// The same for a job that borrows all that is spent from `lender`, if there is one.
+    pub fn lent(limits: &Limits, lender: Option<Arc<dyn Lend>>) -> Self {
+        let &Limits { memory_bytes, texture_px, texture_total_px, .. } = limits;
         Self {
             recorded: None,
-            lender: lender.clone(),
+            lender,
             lent_from: 0,
             spent: 0,
             limit: memory_bytes,
@@ -147,8 +134,8 @@ impl Budget {
 
     /// This budget with its spending so far, for a job that borrows from `lender` all that is spent beyond `from` bytes.
     #[must_use]
-    pub fn lent_by(&self, lender: &Lender, from: u64) -> Self {
-        Self { lender: lender.clone(), lent_from: from.min(self.spent), ..self.clone() }
+    pub fn lent_by(&self, lender: Option<Arc<dyn Lend>>, from: u64) -> Self {
+        Self { lender, lent_from: from.min(self.spent), ..self.clone() }
     }
 
     /// Takes `count * size_bytes` from the budget for `what`, or refuses.
@@ -156,7 +143,7 @@ impl Budget {
         let bytes = count.saturating_mul(size_bytes);
         let wanted = self.spent.saturating_add(bytes);
         check(&format!("the memory for {what}, in bytes,"), wanted, self.limit, "--limit-memory-bytes")?;
-        if let Some(lender) = &self.lender.0 {
+        if let Some(lender) = &self.lender {
             lender.lend(wanted - self.lent_from).map_err(|limit| LimitExceeded {
                 what: format!("the memory for {what}, in bytes,"),
                 given: wanted,
@@ -175,7 +162,7 @@ impl Budget {
     /// ever hold.
     pub fn lend_beside(&self, bytes: u64) -> Result<(), u64> {
         let wanted = (self.spent - self.lent_from).saturating_add(bytes);
-        self.lender.0.as_ref().map_or(Ok(()), |lender| lender.lend(wanted))
+        self.lender.as_ref().map_or(Ok(()), |lender| lender.lend(wanted))
     }
 
     /// Runs `work`, and returns what it spent as well, in order.

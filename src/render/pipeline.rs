@@ -28,20 +28,19 @@ pub fn render(
     job: Job<'_>,
     backends: &mut Backends,
     limits: &Limits,
+    budget: &mut Budget,
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Output, RenderError> {
-    let mut budget = Budget::new(limits);
-
     // Bytes -> Mesh
     let Job { bundle, format_in, spec } = job;
     let options = import::Options { format: format_in, time_s: spec.time_s, ..import::Options::default() };
-    let model = Model::read(&bundle, options, limits, &mut budget, deadline)?;
+    let model = Model::read(&bundle, options, limits, budget, deadline)?;
     // The files' memory is free for drawing, unless the caller holds them, too.
     drop(bundle);
     ended(Stage::Parse);
 
-    render_model(&model, spec, backends, &mut budget, deadline, ended)
+    render_model(&model, spec, backends, budget, deadline, ended)
 }
 
 /// Turns a mesh that is in memory already into the bytes of a picture.

@@ -25,7 +25,7 @@ use meshsnap_inspect::check::{self, Check, Verdict, unopened};
 use meshsnap_inspect::opened::{self, Opened};
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::backend::{Backends, GpuHost, HardwareHint};
-use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_render::pluralise::pluralise;
 use meshsnap_render::spec::NamedView;
 use meshsnap_server::config::{cores, why_no_gpu};
@@ -195,7 +195,7 @@ impl<'a> Run<'a> {
                 digest = Some(Digest::of(&own.bytes).to_string());
             }
             paths = named.bundle.files().iter().map(|file| file.path.clone()).collect();
-            opened::open(&named.bundle, format, &self.limits, &Deadline::default())
+            opened::open(&named.bundle, format, &self.limits, Budget::new(&self.limits), &Deadline::default())
         });
         let Read { value: opened, names, unread } = match read {
             Ok(read) => read,

@@ -14,7 +14,7 @@ use crate::siblings;
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::backend::{Backends, GpuHost, HardwareHint};
 use meshsnap_render::import::{FileUse, MeshFault, Options};
-use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_render::pipeline::{self, Job, RenderError, Stage};
 use meshsnap_render::spec::Spec;
 use meshsnap_render::warning::Warning;
@@ -64,7 +64,7 @@ impl Drawing<'_> {
         let drawing = Arc::new(DrawingThreads::new(threads));
         let drawn = drawing.install(|| {
             let mut backends = Backends::sharing(gpu.clone(), drawing.clone());
-            pipeline::render(job, &mut backends, limits, &Deadline::default(), &mut ended)
+            pipeline::render(job, &mut backends, limits, &mut Budget::new(limits), &Deadline::default(), &mut ended)
         });
         drop(progress);
         let beside = || self.advice(&names, &common, &file_use);

@@ -286,7 +286,6 @@ mod tests {
             texture_total_px: _,
             bundle_bytes: _,
             bundle_entries: _,
-            lender: _,
         } = Limits::default();
         // Those of a body and of a job's time concern the service alone.
         assert_eq!(count, 9 + 2, "a limit without a flag, or a flag without a limit");

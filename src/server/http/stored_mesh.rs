@@ -10,7 +10,6 @@ use crate::keys::Access;
 use crate::memory::Share;
 use crate::store::{Reading, StoredMesh};
 use meshsnap_render::import::Bundle;
-use meshsnap_render::limits::Lender;
 
 /// The stored mesh with this name, if the sender sees it. None is a path segment that is not text.
 pub fn find(state: &AppState, name: Option<&str>, access: &Access) -> Result<Arc<StoredMesh>, ApiError> {
@@ -53,7 +52,7 @@ pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<Share>) ->
         mesh_key: None,
         task,
         memory,
-        lender: Lender(None),
+        lender: None,
         recipe: None,
         owner: Owner::default(),
         request_id: "".into(),

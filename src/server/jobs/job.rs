@@ -20,7 +20,7 @@ use meshsnap_inspect::check::RuleSet;
 use meshsnap_render::backend::{BackendKind, DrawTimes};
 use meshsnap_render::image::ImageFormat;
 use meshsnap_render::import::{Bundle, Format};
-use meshsnap_render::limits::{Deadline, Lender};
+use meshsnap_render::limits::{Budget, Deadline, Lend, Limits};
 use meshsnap_render::pipeline::{Output, QualitySelection, RenderError, Stage};
 use meshsnap_render::spec::Spec;
 use meshsnap_render::warning::Warning;
@@ -70,7 +70,7 @@ pub struct Work {
     /// The memory of `bundle`, shared with all other holders of the same bytes.
     pub memory: Arc<Share>,
     /// The memory that a worker borrows for it. None until one begins it.
-    pub lender: Lender,
+    pub lender: Option<Arc<dyn Lend>>,
     /// The request that `task` was read from, so that it can be read again after a restart. None for work that
     /// nobody fetches later.
     pub recipe: Option<Arc<Recipe>>,
@@ -84,6 +84,13 @@ pub struct Work {
     pub claim: Option<Arc<Claim>>,
     /// The address that hears of its end.
     pub webhook: Option<Arc<str>>,
+}
+
+impl Work {
+    /// An unspent budget, of which all that is spent is borrowed as the job's memory.
+    pub fn budget(&self, limits: &Limits) -> Budget {
+        Budget::lent(limits, self.lender.clone())
+    }
 }
 
 /// A request for a picture, as it was sent.
