@@ -70,17 +70,16 @@ fn time_s(bytes: &[u8]) -> Option<f64> {
 
 /// Limits that are small, so that inputs break them soon, and large enough for every seed.
 fn limits() -> Limits {
-    Limits {
-        memory_bytes: 64 << 20,
-        triangles: 50_000,
-        nodes: 2_000,
-        image_px: 64,
-        texture_px: 256,
-        texture_total_px: 1 << 18,
-        bundle_bytes: 4 << 20,
-        bundle_entries: 50,
-        ..Limits::default()
-    }
+    Limits::default().with(|limits| {
+        limits.memory_bytes = 64 << 20;
+        limits.triangles = 50_000;
+        limits.nodes = 2_000;
+        limits.image_px = 64;
+        limits.texture_px = 256;
+        limits.texture_total_px = 1 << 18;
+        limits.bundle_bytes = 4 << 20;
+        limits.bundle_entries = 50;
+    })
 }
 
 fn obj(bytes: &[u8]) -> Bundle {

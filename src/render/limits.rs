@@ -8,8 +8,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// The most that a job or a request may use. The defaults are those of the public contract, and
-/// each can be configured.
+/// each can be configured: set its field, or several in [`with`](Self::with).
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Limits {
     /// Memory that one job may hold at once, bytes: mesh, plan, frame buffers.
     pub memory_bytes: u64,
@@ -29,6 +30,15 @@ pub struct Limits {
     pub bundle_bytes: u64,
     /// Files of one bundle. Every entry of a zip archive counts, folders too.
     pub bundle_entries: u64,
+}
+
+impl Limits {
+    /// These limits with changes: `Limits::default().with(|limits| limits.triangles = 100_000)`.
+    #[must_use]
+    pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
+        change(&mut self);
+        self
+    }
 }
 
 /// The owner of memory that several jobs share.

@@ -305,7 +305,7 @@ fn a_limit_that_a_rule_hits_is_told_by_that_rule() {
     let bundle = Bundle::of_one(cube().text().into_bytes());
     let deadline = Deadline::default();
     let opened = |memory_bytes| {
-        let limits = Limits { memory_bytes, ..Limits::default() };
+        let limits = Limits::default().with(|limits| limits.memory_bytes = memory_bytes);
         opened::open(&bundle, None, &limits, Budget::new(&limits), &deadline)
     };
     // The least memory with which the file opens leaves none for its edges.
