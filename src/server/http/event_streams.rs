@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::watch;
 
-use super::error::{ApiError, Fault};
+use super::error::{ApiError, ErrorKind};
 use crate::jobs::Owner;
 
 /// Most streams that one client has open.
@@ -38,7 +38,7 @@ impl EventStreams {
             let detail = format!(
                 "this client has {STREAMS_OF_OWNER_MAX} event streams open, and no more are allowed; close one"
             );
-            return Err(ApiError::new(Fault::Busy, "streams_full", detail).retry_after(1));
+            return Err(ApiError::new(ErrorKind::Busy, "streams_full", detail).retry_after(1));
         }
         *count += 1;
         Ok(Place { owner: owner.clone(), open: self.open.clone(), closing: self.closing.subscribe() })

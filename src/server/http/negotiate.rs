@@ -8,7 +8,7 @@ use std::time::Duration;
 use axum::http::{HeaderMap, header};
 
 use super::dto::media_type;
-use super::error::{ApiError, Fault};
+use super::error::{ApiError, ErrorKind};
 use crate::jobs::Media;
 use meshsnap_render::image::ImageFormat;
 
@@ -47,7 +47,7 @@ fn picture_format(media: Media) -> Option<ImageFormat> {
 }
 
 fn not_acceptable(detail: &str) -> ApiError {
-    ApiError::new(Fault::NotAcceptable, "not_acceptable", detail).header(header::VARY, "accept")
+    ApiError::new(ErrorKind::NotAcceptable, "not_acceptable", detail).header(header::VARY, "accept")
 }
 
 /// The form that a client accepts best. None if it accepts none.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::error::{ApiError, Fault};
+use super::error::{ApiError, ErrorKind};
 use super::state::AppState;
 use crate::digest::Digest;
 use crate::jobs::{Owner, Task, Work};
@@ -20,7 +20,7 @@ pub fn find(state: &AppState, name: Option<&str>, access: &Access) -> Result<Arc
 pub fn digest(name: Option<&str>) -> Result<Digest, ApiError> {
     name.and_then(Digest::parse).ok_or_else(|| {
         let detail = "the path names no SHA-256, which is 64 lower-case hexadecimal digits";
-        ApiError::new(Fault::BadRequest, "bad_digest", detail)
+        ApiError::new(ErrorKind::BadRequest, "bad_digest", detail)
     })
 }
 
@@ -28,7 +28,7 @@ pub fn digest(name: Option<&str>) -> Result<Digest, ApiError> {
 pub fn unknown() -> ApiError {
     let detail =
         "no mesh of this name is stored: it never was, or was deleted, or made room for others; send it to /v1/meshes";
-    ApiError::new(Fault::NotFound, "mesh_unknown", detail)
+    ApiError::new(ErrorKind::NotFound, "mesh_unknown", detail)
 }
 
 /// A worker's task on a stored mesh.
