@@ -65,7 +65,7 @@ struct Judged {
 
 /// The findings of a run.
 #[derive(Default)]
-struct Found {
+struct RunFindings {
     verdicts: Vec<Verdict>,
     /// The pictures of each verdict.
     pictures: Vec<Vec<ViewPictures>>,
@@ -111,7 +111,7 @@ impl<'a> Run<'a> {
         let threads = self.arguments.jobs.map_or(cores() as usize, usize::from).min(self.tasks.all.len());
         let next = AtomicUsize::new(0);
         let (sender, outcomes) = channel();
-        let Found { verdicts, pictures, lost, failure } = std::thread::scope(|scope| {
+        let RunFindings { verdicts, pictures, lost, failure } = std::thread::scope(|scope| {
             for _ in 0..threads {
                 let (sender, next) = (sender.clone(), &next);
                 scope.spawn(move || {
@@ -263,8 +263,8 @@ impl<'a> Run<'a> {
     }
 
     /// Prints the verdicts in order, and returns all.
-    fn print(&self, outcomes: &Receiver<(usize, Outcome)>) -> Result<Found, CliError> {
-        let mut found = Found::default();
+    fn print(&self, outcomes: &Receiver<(usize, Outcome)>) -> Result<RunFindings, CliError> {
+        let mut found = RunFindings::default();
         let bar = Bar::start(self.tasks.all.len() as u64);
         let mut waiting: BTreeMap<usize, Outcome> = BTreeMap::new();
         let mut next = 0;

@@ -10,7 +10,7 @@ use super::dispatch::Next;
 use super::job::{Checking, Comparing, Failure, Finished, Job, JobState, Product, Task, Timings, Work};
 use super::registry::JobRegistry;
 use crate::priority;
-use crate::residents::{Found, Residents};
+use crate::residents::{FoundMesh, Residents};
 use crate::telemetry::traces;
 use meshsnap_inspect::check::{self, Verdict};
 use meshsnap_inspect::{
@@ -104,7 +104,7 @@ fn render_stored(
     let time_s = job.spec.time_s;
     // Exact, and different for 0 and -0.
     let key = time_s.map_or_else(|| key.to_owned(), |time_s| format!("{key} at {time_s:?} s"));
-    let Found { resident, was_kept } = residents.find(&key, deadline, || {
+    let FoundMesh { resident, was_kept } = residents.find(&key, deadline, || {
         let mut budget = Budget::lent(limits, lender.clone());
         let options = import::Options { format: job.format_in, time_s, ..import::Options::default() };
         let model = Model::read(&job.bundle, options, limits, &mut budget, deadline)?;
