@@ -9,7 +9,7 @@ use std::time::Duration;
 use quick_cache::sync::GuardResult;
 
 use super::cache::{ByteCache, Weighed, shrink_for, with_room_for};
-use super::memory::{Account, Memory, Share};
+use super::memory::{Account, Memory, MemoryShare};
 use meshsnap_render::limits::{Budget, Deadline};
 use meshsnap_render::pipeline::{Model, RenderError};
 
@@ -30,7 +30,7 @@ pub struct Resident {
     /// A job's budget after reading it, so that a job that reads nothing has as much left.
     pub budget: Budget,
     /// The bytes that it counts with as long as anything holds it. None: it is not kept, and is its job's memory.
-    memory: Share,
+    memory: MemoryShare,
 }
 
 /// A mesh that a job draws.

@@ -7,7 +7,7 @@ use super::state::AppState;
 use crate::digest::Digest;
 use crate::jobs::{Owner, Task, Work};
 use crate::keys::Access;
-use crate::memory::Share;
+use crate::memory::MemoryShare;
 use crate::store::{Reading, StoredMesh};
 use meshsnap_render::import::Bundle;
 
@@ -44,7 +44,7 @@ pub fn key(digest: Digest, reading: &Reading) -> String {
 }
 
 /// A worker's task on a bundle that is read in the given way.
-pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<Share>) -> Work {
+pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<MemoryShare>) -> Work {
     let Reading { format_in, entry } = reading;
     Work {
         bundle: bundle.with_entry(entry),

@@ -49,7 +49,7 @@ fn the_other_accounts_leave_jobs_their_part() {
 }
 
 /// A cache of shares of 100 bytes.
-fn cache(memory: &Arc<Memory>, account: Account, count: usize) -> Arc<Mutex<Vec<Share>>> {
+fn cache(memory: &Arc<Memory>, account: Account, count: usize) -> Arc<Mutex<Vec<MemoryShare>>> {
     let shares: Vec<_> = (0..count).map(|_| memory.share(account)).collect();
     shares.iter().for_each(|share| share.grow(100).unwrap());
     let cache = Arc::new(Mutex::new(shares));

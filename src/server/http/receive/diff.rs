@@ -19,7 +19,7 @@ use crate::http::state::AppState;
 use crate::http::{negotiate, stored_mesh};
 use crate::jobs::{Class, Comparing, Newer, Recipe, Task, Work};
 use crate::keys::Access;
-use crate::memory::Share;
+use crate::memory::MemoryShare;
 use crate::store::Reading;
 use meshsnap_inspect::diff;
 use meshsnap_render::image::ImageFormat;
@@ -111,7 +111,7 @@ fn stored(
 }
 
 /// Two meshes that were sent.
-async fn sent(bundles: [Bundle; 2], memory: [Share; 2], reading: &Reading) -> Result<Meshes, ApiError> {
+async fn sent(bundles: [Bundle; 2], memory: [MemoryShare; 2], reading: &Reading) -> Result<Meshes, ApiError> {
     for bundle in &bundles {
         bundle.check_sent().map_err(|error| ApiError::from(&error))?;
     }

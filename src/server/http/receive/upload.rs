@@ -8,7 +8,7 @@ use axum::body::Bytes;
 use super::body::{self, BodyKind, Upload};
 use crate::digest::Digest;
 use crate::http::error::{ApiError, ErrorKind};
-use crate::memory::Share;
+use crate::memory::MemoryShare;
 use meshsnap_render::import::Bundle;
 
 /// An upload and its name.
@@ -18,7 +18,7 @@ pub struct NamedUpload {
     /// The files to store.
     pub bundle: Bundle,
     /// The memory of the upload.
-    pub memory: Arc<Share>,
+    pub memory: Arc<MemoryShare>,
 }
 
 /// Names an upload: a file or an archive by its bytes, a form by the list of its files.

@@ -12,7 +12,7 @@ use futures_util::{Stream, StreamExt as _, stream};
 
 use crate::http::error::{ApiError, ErrorKind};
 use crate::jobs::Refusal;
-use crate::memory::{Account, Memory, Share};
+use crate::memory::{Account, Memory, MemoryShare};
 use meshsnap_render::import::{Bundle, BundleFile};
 use meshsnap_render::limits;
 
@@ -36,7 +36,7 @@ pub struct Upload {
     /// The request document, if the body is a multipart form that has one.
     pub document: Option<Bytes>,
     /// The memory that bundle and document take.
-    pub reservation: Share,
+    pub reservation: MemoryShare,
 }
 
 /// Kinds of bodies, by `Content-Type`.
@@ -242,7 +242,7 @@ struct MeterState {
     bytes: u64,
     /// Bytes since the last part of a form, while the parser searches the next one.
     bytes_between_parts: Option<u64>,
-    reservation: Share,
+    reservation: MemoryShare,
     error: Option<ApiError>,
 }
 
@@ -301,7 +301,7 @@ impl Meter {
     }
 
     /// Hands over the memory that was reserved so far.
-    fn take_reservation(&self) -> Share {
+    fn take_reservation(&self) -> MemoryShare {
         std::mem::replace(&mut self.lock().reservation, self.memory.share(Account::Uploads))
     }
 
