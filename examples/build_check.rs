@@ -7,7 +7,7 @@ use std::error::Error;
 use meshsnap_inspect::check::{Options, RuleSet};
 use meshsnap_inspect::opened;
 use meshsnap_render::import::Bundle;
-use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let rules = RuleSet::parse(["opens", "manifold", "max-triangles:100000"], ["watertight"])?;
@@ -15,7 +15,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     for path in std::env::args().skip(1) {
         println!("cargo:rerun-if-changed={path}");
         let (limits, deadline) = (Limits::default(), Deadline::default());
-        let opened = opened::open(&Bundle::of_one(std::fs::read(&path)?), None, &limits, &deadline)?;
+        let opened =
+            opened::open(&Bundle::of_one(std::fs::read(&path)?), None, &limits, Budget::new(&limits), &deadline)?;
         for check in opened.check(&rules, Options::default(), &deadline)?.iter().filter(|check| !check.ok) {
             println!("cargo:warning={path}: {}: {}", check.rule, check.detail);
             failed += usize::from(check.fails());

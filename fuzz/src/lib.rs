@@ -10,7 +10,7 @@ use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_render::mesh::Mesh;
 use meshsnap_render::mesh::material::{AlphaMode, FileLens};
 use meshsnap_render::pipeline;
-use meshsnap_render::pipeline::{Job, RenderError};
+use meshsnap_render::pipeline::{Context, Job, RenderError};
 use meshsnap_render::request;
 use meshsnap_render::request::Rules;
 use meshsnap_render::spec::BackendChoice;
@@ -70,17 +70,16 @@ fn time_s(bytes: &[u8]) -> Option<f64> {
 
 /// Limits that are small, so that inputs break them soon, and large enough for every seed.
 fn limits() -> Limits {
-    Limits {
-        memory_bytes: 64 << 20,
-        triangles: 50_000,
-        nodes: 2_000,
-        image_px: 64,
-        texture_px: 256,
-        texture_total_px: 1 << 18,
-        bundle_bytes: 4 << 20,
-        bundle_entries: 50,
-        ..Limits::default()
-    }
+    Limits::default().with(|limits| {
+        limits.memory_bytes = 64 << 20;
+        limits.triangles = 50_000;
+        limits.nodes = 2_000;
+        limits.image_px = 64;
+        limits.texture_px = 256;
+        limits.texture_total_px = 1 << 18;
+        limits.bundle_bytes = 4 << 20;
+        limits.bundle_entries = 50;
+    })
 }
 
 fn obj(bytes: &[u8]) -> Bundle {
@@ -192,8 +191,10 @@ fn run_pipeline(bytes: &[u8]) {
     let bundle = Bundle::of_one(mesh.to_vec());
     let job = Job { bundle, format_in: None, spec: &spec };
     let deadline = Deadline::default();
-    let drawn =
-        BACKENDS.with_borrow_mut(|backends| pipeline::render(job, backends, &rules.limits, &deadline, &mut |_| {}));
+    let budget = Budget::new(&rules.limits);
+    let drawn = BACKENDS.with_borrow_mut(|backends| {
+        pipeline::render(job, &rules.limits, Context { backends, budget, deadline: &deadline, ended: &mut |_| {} })
+    });
     match drawn {
         Ok(output) => assert!(!output.bytes.is_empty()),
         Err(RenderError::Mesh(_) | RenderError::Plan(_)) => {}

@@ -25,14 +25,14 @@ pub struct Opened {
     file_bytes: u64,
 }
 
-/// Reads a file, to judge it or to compare it.
+/// Reads a file, to judge it or to compare it. What is worked out of it later comes from the rest of `budget`.
 pub fn open(
     bundle: &Bundle,
     options: impl Into<import::Options>,
     limits: &Limits,
+    mut budget: Budget,
     deadline: &Deadline,
 ) -> Result<Opened, MeshError> {
-    let mut budget = Budget::new(limits);
     let options = import::Options { counts_loose: true, ..options.into() };
     let imported = import::import(bundle, options, limits, &mut budget, deadline)?;
     Ok(Opened { imported, prepared: Prepared::default(), budget, file_bytes: bundle.bytes_len() })

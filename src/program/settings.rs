@@ -42,7 +42,7 @@ impl LimitSettings {
 
 fn is_limit(setting: &&Setting) -> bool {
     // Nothing waits here, and no request has a body: these are of the service alone.
-    const OF_SERVICE: [&str; 3] = ["limit-body-bytes", "limit-job-ms", "limit-queue-per-worker"];
+    const OF_SERVICE: [&str; 2] = ["limit-body-bytes", "limit-job-ms"];
     setting.key.starts_with("limit-") && !OF_SERVICE.contains(&setting.key)
 }
 

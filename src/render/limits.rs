@@ -8,11 +8,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// The most that a job or a request may use. The defaults are those of the public contract, and
-/// each can be configured.
+/// each can be configured: set its field, or several in [`with`](Self::with).
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Limits {
-    /// The largest request body that is accepted, bytes.
-    pub body_bytes: u64,
     /// Memory that one job may hold at once, bytes: mesh, plan, frame buffers.
     pub memory_bytes: u64,
     /// Triangles after triangulation and instancing.
@@ -31,12 +30,15 @@ pub struct Limits {
     pub bundle_bytes: u64,
     /// Files of one bundle. Every entry of a zip archive counts, folders too.
     pub bundle_entries: u64,
-    /// Wall-clock time for one job, from the moment at which a worker begins it to the encoded image, milliseconds.
-    pub job_ms: u64,
-    /// Jobs that wait per worker. A full queue refuses a job at once and never blocks.
-    pub queue_per_worker: u64,
-    /// The owner of the memory that jobs share. None: each job has its own.
-    pub lender: Lender,
+}
+
+impl Limits {
+    /// These limits with changes: `Limits::default().with(|limits| limits.triangles = 100_000)`.
+    #[must_use]
+    pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
+        change(&mut self);
+        self
+    }
 }
 
 /// The owner of memory that several jobs share.
@@ -49,26 +51,9 @@ pub trait Lend: std::fmt::Debug + Send + Sync {
     fn restart(&self);
 }
 
-/// An owner of memory, or none.
-#[derive(Clone, Debug, Default)]
-pub struct Lender(pub Option<Arc<dyn Lend>>);
-
-impl PartialEq for Lender {
-    fn eq(&self, other: &Self) -> bool {
-        match (&self.0, &other.0) {
-            (Some(one), Some(other)) => Arc::ptr_eq(one, other),
-            (None, None) => true,
-            _ => false,
-        }
-    }
-}
-
-impl Eq for Lender {}
-
 impl Default for Limits {
     fn default() -> Self {
         Self {
-            body_bytes: 64 << 20,
             memory_bytes: 2 << 30,
             triangles: 10_000_000,
             nodes: 100_000,
@@ -78,9 +63,6 @@ impl Default for Limits {
             texture_total_px: 256 << 20,
             bundle_bytes: 512 << 20,
             bundle_entries: 1000,
-            job_ms: 30_000,
-            queue_per_worker: 64,
-            lender: Lender(None),
         }
     }
 }
@@ -89,7 +71,7 @@ impl Default for Limits {
 /// No setting exceeds it.
 pub const IMAGE_PX_MAX: u64 = 4096;
 
-/// The longest time that a setting can give a job, milliseconds: a day, so that no sum of times
+/// The longest time that a request or a setting can give a job, milliseconds: a day, so that no sum of times
 /// overflows.
 pub const JOB_MS_MAX: u64 = 24 * 3600 * 1000;
 
@@ -128,7 +110,8 @@ pub struct Spent {
 pub struct Budget {
     /// A list of all that is spent while [`record`](Self::record) runs; None at other times.
     recorded: Option<Vec<Spent>>,
-    lender: Lender,
+    /// The owner of the memory that jobs share. None: each job has its own.
+    lender: Option<Arc<dyn Lend>>,
     /// Bytes that were spent before, and that the lender does not lend.
     lent_from: u64,
     spent: u64,
@@ -141,10 +124,15 @@ pub struct Budget {
 impl Budget {
     /// An unspent budget of `limits.memory_bytes`, with the limits on textures.
     pub fn new(limits: &Limits) -> Self {
-        let &Limits { memory_bytes, texture_px, texture_total_px, ref lender, .. } = limits;
+        Self::lent(limits, None)
+    }
+
+    /// The same for a job that borrows all that is spent from `lender`, if there is one.
+    pub fn lent(limits: &Limits, lender: Option<Arc<dyn Lend>>) -> Self {
+        let &Limits { memory_bytes, texture_px, texture_total_px, .. } = limits;
         Self {
             recorded: None,
-            lender: lender.clone(),
+            lender,
             lent_from: 0,
             spent: 0,
             limit: memory_bytes,
@@ -156,8 +144,8 @@ impl Budget {
 
     /// This budget with its spending so far, for a job that borrows from `lender` all that is spent beyond `from` bytes.
     #[must_use]
-    pub fn lent_by(&self, lender: &Lender, from: u64) -> Self {
-        Self { lender: lender.clone(), lent_from: from.min(self.spent), ..self.clone() }
+    pub fn lent_by(&self, lender: Option<Arc<dyn Lend>>, from: u64) -> Self {
+        Self { lender, lent_from: from.min(self.spent), ..self.clone() }
     }
 
     /// Takes `count * size_bytes` from the budget for `what`, or refuses.
@@ -165,7 +153,7 @@ impl Budget {
         let bytes = count.saturating_mul(size_bytes);
         let wanted = self.spent.saturating_add(bytes);
         check(&format!("the memory for {what}, in bytes,"), wanted, self.limit, "--limit-memory-bytes")?;
-        if let Some(lender) = &self.lender.0 {
+        if let Some(lender) = &self.lender {
             lender.lend(wanted - self.lent_from).map_err(|limit| LimitExceeded {
                 what: format!("the memory for {what}, in bytes,"),
                 given: wanted,
@@ -184,7 +172,7 @@ impl Budget {
     /// ever hold.
     pub fn lend_beside(&self, bytes: u64) -> Result<(), u64> {
         let wanted = (self.spent - self.lent_from).saturating_add(bytes);
-        self.lender.0.as_ref().map_or(Ok(()), |lender| lender.lend(wanted))
+        self.lender.as_ref().map_or(Ok(()), |lender| lender.lend(wanted))
     }
 
     /// Runs `work`, and returns what it spent as well, in order.

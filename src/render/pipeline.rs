@@ -39,25 +39,17 @@ pub struct Context<'a> {
 
 /// Turns the bytes of a mesh into the bytes of a picture.
 ///
-/// `ended` is called at the end of each stage, so that the caller can keep the time.
-pub fn render(
-    job: Job<'_>,
-    backends: &mut Backends,
-    limits: &Limits,
-    deadline: &Deadline,
-    ended: &mut dyn FnMut(Stage),
-) -> Result<Output, RenderError> {
-    let mut budget = Budget::new(limits);
-
+/// `limits` are those of the file; the memory that is left is the context's.
+pub fn render(job: Job<'_>, limits: &Limits, mut cx: Context<'_>) -> Result<Output, RenderError> {
     // Bytes -> Mesh
     let Job { bundle, format_in, spec } = job;
     let options = import::Options { format: format_in, time_s: spec.time_s, ..import::Options::default() };
-    let model = Model::read(&bundle, options, limits, &mut budget, deadline)?;
+    let model = Model::read(&bundle, options, limits, &mut cx.budget, cx.deadline)?;
     // The files' memory is free for drawing, unless the caller holds them, too.
     drop(bundle);
-    ended(Stage::Parse);
+    (cx.ended)(Stage::Parse);
 
-    render_model(&model, spec, Context { backends, budget, deadline, ended })
+    render_model(&model, spec, cx)
 }
 
 /// Turns a mesh that is in memory already into the bytes of a picture.

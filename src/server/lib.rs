@@ -14,7 +14,6 @@ pub mod jobs;
 pub mod keys;
 pub mod memory;
 pub mod metrics;
-pub mod percent;
 pub mod pictures;
 pub mod priority;
 pub mod rates;

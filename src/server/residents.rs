@@ -9,7 +9,7 @@ use std::time::Duration;
 use quick_cache::sync::GuardResult;
 
 use super::cache::{ByteCache, Weighed, shrink_for, with_room_for};
-use super::memory::{Account, Memory, Share};
+use super::memory::{Account, Memory, MemoryShare};
 use meshsnap_render::limits::{Budget, Deadline};
 use meshsnap_render::pipeline::{Model, RenderError};
 
@@ -30,12 +30,12 @@ pub struct Resident {
     /// A job's budget after reading it, so that a job that reads nothing has as much left.
     pub budget: Budget,
     /// The bytes that it counts with as long as anything holds it. None: it is not kept, and is its job's memory.
-    memory: Share,
+    memory: MemoryShare,
 }
 
 /// A mesh that a job draws.
 #[derive(Debug)]
-pub struct Found {
+pub struct FoundMesh {
     /// The mesh.
     pub resident: Arc<Resident>,
     /// True if it was in memory; false if this job has read it.
@@ -89,17 +89,17 @@ impl Residents {
         key: &str,
         deadline: &Deadline,
         read: impl FnOnce() -> Result<(Model, Budget), RenderError>,
-    ) -> Result<Found, RenderError> {
+    ) -> Result<FoundMesh, RenderError> {
         let read = || {
             let (model, budget) = read()?;
             Ok(Arc::new(Resident { model, budget, memory: self.memory.share(Account::Residents) }))
         };
         if self.bytes == 0 {
-            return read().map(|resident| Found { resident, was_kept: false });
+            return read().map(|resident| FoundMesh { resident, was_kept: false });
         }
         loop {
             match self.cache.get_value_or_guard(key, Some(WAIT)) {
-                GuardResult::Value(kept) => return Ok(Found { resident: kept.resident, was_kept: true }),
+                GuardResult::Value(kept) => return Ok(FoundMesh { resident: kept.resident, was_kept: true }),
                 GuardResult::Guard(guard) => {
                     let resident = read()?;
                     let kept = Kept::new(&resident);
@@ -107,7 +107,7 @@ impl Residents {
                     if kept.bytes <= self.bytes && resident.memory.grow(kept.bytes).is_ok() {
                         let _ = guard.insert(kept);
                     }
-                    return Ok(Found { resident, was_kept: false });
+                    return Ok(FoundMesh { resident, was_kept: false });
                 }
                 GuardResult::Timeout => deadline.check()?,
             }

@@ -74,7 +74,7 @@ fn ms(began: Instant) -> f64 {
 }
 
 fn read(file: &MeshFile) -> Mesh {
-    let limits = Limits { memory_bytes: 16 << 30, ..Limits::default() };
+    let limits = Limits::default().with(|limits| limits.memory_bytes = 16 << 30);
     let bundle = Bundle::of_one(file.bytes.clone());
     import::import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap().mesh
 }
@@ -88,7 +88,7 @@ fn measure(
     (workers, rounds): (usize, usize),
     (copies, pause): (bool, Duration),
 ) {
-    let limits = Limits { memory_bytes: 16 << 30, ..Limits::default() };
+    let limits = Limits::default().with(|limits| limits.memory_bytes = 16 << 30);
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Gpu };
     let counts: Vec<&str> = samples.split(',').collect();

@@ -4,7 +4,7 @@ use super::*;
 use crate::made_obj::{Obj, SIDES};
 use crate::opened;
 use meshsnap_render::import::Bundle;
-use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
 
 fn cube() -> Obj {
     Obj::default().cube([0.0; 3], [1.0; 3])
@@ -16,7 +16,8 @@ fn judge(text: &str, rule: &str) -> Check {
     let rules = RuleSet::parse([rule], []).unwrap();
     let bundle = Bundle::of_one(text.as_bytes().to_vec());
     let deadline = Deadline::default();
-    let mut checks = match opened::open(&bundle, None, &Limits::default(), &deadline) {
+    let limits = Limits::default();
+    let mut checks = match opened::open(&bundle, None, &limits, Budget::new(&limits), &deadline) {
         Ok(opened) => opened.check(&rules, Options::default(), &deadline).unwrap(),
         Err(fault) => vec![unopened(fault.to_string())],
     };
@@ -304,8 +305,8 @@ fn a_limit_that_a_rule_hits_is_told_by_that_rule() {
     let bundle = Bundle::of_one(cube().text().into_bytes());
     let deadline = Deadline::default();
     let opened = |memory_bytes| {
-        let limits = Limits { memory_bytes, ..Limits::default() };
-        opened::open(&bundle, None, &limits, &deadline)
+        let limits = Limits::default().with(|limits| limits.memory_bytes = memory_bytes);
+        opened::open(&bundle, None, &limits, Budget::new(&limits), &deadline)
     };
     // The least memory with which the file opens leaves none for its edges.
     let least = (0..200).map(|n| 256 * n).find(|bytes| opened(*bytes).is_ok()).unwrap();
@@ -327,7 +328,8 @@ fn all_places_are_listed_on_request_up_to_a_bound_of_the_whole_verdict() {
     let with = |count: usize, options: Options| {
         let rules = RuleSet::parse(["watertight", "manifold"], ["no-warnings"]).unwrap();
         let bundle = Bundle::of_one(Obj::row(count).text().into_bytes());
-        let opened = opened::open(&bundle, None, &Limits::default(), &Deadline::default()).unwrap();
+        let limits = Limits::default();
+        let opened = opened::open(&bundle, None, &limits, Budget::new(&limits), &Deadline::default()).unwrap();
         opened.check(&rules, options, &Deadline::default()).unwrap()
     };
     let options = Options { all_places: true, ..Options::default() };

@@ -4,12 +4,13 @@ use super::*;
 use crate::made_obj::Obj;
 use crate::opened::{self, Opened};
 use meshsnap_render::import::Bundle;
-use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_render::mesh::vector::{cross, dot, sub};
 
 fn open(text: &str) -> Opened {
     let bundle = Bundle::of_one(text.as_bytes().to_vec());
-    opened::open(&bundle, None, &Limits::default(), &Deadline::default()).unwrap()
+    let limits = Limits::default();
+    opened::open(&bundle, None, &limits, Budget::new(&limits), &Deadline::default()).unwrap()
 }
 
 fn texts(a: &str, b: &str, max_distance: Option<f64>) -> Difference {

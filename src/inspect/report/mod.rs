@@ -35,13 +35,13 @@ pub fn inspect(
     options: impl Into<import::Options>,
     extras: Extras,
     limits: &Limits,
+    budget: &mut Budget,
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Report, MeshError> {
-    let mut budget = Budget::new(limits);
-    let Imported { mesh, report, .. } = import::import(bundle, options, limits, &mut budget, deadline)?;
+    let Imported { mesh, report, .. } = import::import(bundle, options, limits, budget, deadline)?;
     ended(Stage::Parse);
-    Report::of(&mesh, &report, bundle.bytes_len(), extras, &mut budget, deadline)
+    Report::of(&mesh, &report, bundle.bytes_len(), extras, budget, deadline)
 }
 
 /// The contents of a file. Counts are null where the format has no such thing.

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::*;
 use crate::made_obj::Obj;
 use meshsnap_render::import::Bundle;
-use meshsnap_render::limits::Limits;
+use meshsnap_render::limits::{Budget, Limits};
 
 /// The report with all sections.
 fn report(obj: &Obj) -> Value {
@@ -18,7 +18,8 @@ fn report(obj: &Obj) -> Value {
 
 fn report_of(obj: String, extras: Extras) -> Report {
     let (limits, deadline) = (Limits::default(), Deadline::default());
-    inspect(&Bundle::of_one(obj.into_bytes()), None, extras, &limits, &deadline, &mut |_| ()).unwrap()
+    inspect(&Bundle::of_one(obj.into_bytes()), None, extras, &limits, &mut Budget::new(&limits), &deadline, &mut |_| ())
+        .unwrap()
 }
 
 #[track_caller]

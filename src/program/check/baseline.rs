@@ -29,12 +29,12 @@ pub struct Baseline {
 #[derive(Serialize)]
 struct File<'a> {
     sha256: Option<&'a str>,
-    faults: Vec<Fault<'a>>,
+    faults: Vec<AcceptedFault<'a>>,
 }
 
 /// An accepted fault.
 #[derive(Serialize)]
-struct Fault<'a> {
+struct AcceptedFault<'a> {
     rule: &'a str,
     level: Level,
     found: Option<Figure>,
@@ -90,7 +90,8 @@ impl Baseline {
         let path = self.file_of(&verdict.path)?;
         let name = path.display().to_string();
         let unwritable = |error: std::io::Error| CliError::usage(format!("{name}: cannot be written: {error}"));
-        let faults: Vec<Fault<'_>> = verdict.checks.iter().filter(|check| !check.ok).map(Fault::of).collect();
+        let faults: Vec<AcceptedFault<'_>> =
+            verdict.checks.iter().filter(|check| !check.ok).map(AcceptedFault::of).collect();
         if faults.is_empty() {
             return match fs::remove_file(&path) {
                 Err(error) if !matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
@@ -143,7 +144,7 @@ impl Baseline {
     }
 }
 
-impl<'a> Fault<'a> {
+impl<'a> AcceptedFault<'a> {
     fn of(check: &'a Check) -> Self {
         let Check { rule, level, found, detail, places, .. } = check;
         Self { rule, level: *level, found: *found, detail, places }

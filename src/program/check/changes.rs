@@ -5,7 +5,7 @@ use std::path::Path;
 use super::since::Commit;
 use meshsnap_inspect::opened::{self, Opened};
 use meshsnap_render::import::{Bundle, BundleFile, Options, Origin};
-use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
 
 /// The changes of a mesh.
 #[derive(Default)]
@@ -31,7 +31,7 @@ pub fn since(
         Err(why) => return unreadable(&why),
     };
     let deadline = Deadline::default();
-    let older = match opened::open(&bundle, options, limits, &deadline) {
+    let older = match opened::open(&bundle, options, limits, Budget::new(limits), &deadline) {
         Ok(older) => older,
         Err(error) => return unreadable(&error.to_string()),
     };

@@ -65,7 +65,7 @@ impl Config {
         let bytes = files::read(&name, BYTES_MAX).map_err(of_command)?;
         let text = std::str::from_utf8(&bytes).map_err(|_| CliError::usage(format!("{name}: is not UTF-8")))?;
         let folder = comparable(&path).parent().unwrap_or(Path::new("")).to_owned();
-        let config = read(text, folder).map_err(|Fault { at, detail }| {
+        let config = read(text, folder).map_err(|Mistake { at, detail }| {
             let before = &text.as_bytes()[..at.min(text.len())];
             let line = before.iter().filter(|byte| **byte == b'\n').count() + 1;
             let start = before.iter().rposition(|byte| *byte == b'\n').map_or(0, |newline| newline + 1);
@@ -106,13 +106,13 @@ impl Config {
 }
 
 /// A mistake in the file, and where it is, in bytes.
-struct Fault {
+struct Mistake {
     at: usize,
     detail: String,
 }
 
-fn fault(span: Range<usize>, detail: impl Into<String>) -> Fault {
-    Fault { at: span.start, detail: detail.into() }
+fn mistake(span: Range<usize>, detail: impl Into<String>) -> Mistake {
+    Mistake { at: span.start, detail: detail.into() }
 }
 
 type Value<'t> = Spanned<DeValue<'t>>;
@@ -120,14 +120,16 @@ type Value<'t> = Spanned<DeValue<'t>>;
 /// Texts with their places.
 type Texts = Vec<(String, Range<usize>)>;
 
-fn read(text: &str, folder: PathBuf) -> Result<Config, Fault> {
+fn read(text: &str, folder: PathBuf) -> Result<Config, Mistake> {
     let root =
-        DeTable::parse(text).map_err(|error| fault(error.span().unwrap_or_default(), error.message().to_owned()))?;
+        DeTable::parse(text).map_err(|error| mistake(error.span().unwrap_or_default(), error.message().to_owned()))?;
     check_keys(root.get_ref(), &["check"])?;
     let mut config = Config::of(RuleSet::default());
     config.folder = folder;
     let Some(check) = root.get_ref().get("check") else { return Ok(config) };
-    let DeValue::Table(table) = check.get_ref() else { return Err(fault(check.span(), "`check` is a table: [check]")) };
+    let DeValue::Table(table) = check.get_ref() else {
+        return Err(mistake(check.span(), "`check` is a table: [check]"));
+    };
     check_keys(table, &KEYS)?;
     let rules = table.get("rules").map(texts).transpose()?;
     let warn = table.get("warn").map(texts).transpose()?;
@@ -136,15 +138,15 @@ fn read(text: &str, folder: PathBuf) -> Result<Config, Fault> {
     }
     config.baseline = table.get("baseline").map(baseline).transpose()?.map(|dir| config.folder.join(dir));
     for (name, span) in table.get("views").map(texts).transpose()?.unwrap_or_default() {
-        config.views.push(view_of(&name).ok_or_else(|| fault(span, unknown_view(&name)))?);
+        config.views.push(view_of(&name).ok_or_else(|| mistake(span, unknown_view(&name)))?);
     }
     for file in table.get("files").map(list).transpose()?.unwrap_or_default() {
         let DeValue::Table(table) = file.get_ref() else {
-            return Err(fault(file.span(), "`files` has tables: [[check.files]]"));
+            return Err(mistake(file.span(), "`files` has tables: [[check.files]]"));
         };
         check_keys(table, &FILE_KEYS)?;
-        let Some(glob) = table.get("glob") else { return Err(fault(file.span(), "[[check.files]] needs a `glob`")) };
-        let pattern = Pattern::new(&word(glob)?.0).map_err(|e| fault(glob.span(), format!("is no pattern: {e}")))?;
+        let Some(glob) = table.get("glob") else { return Err(mistake(file.span(), "[[check.files]] needs a `glob`")) };
+        let pattern = Pattern::new(&word(glob)?.0).map_err(|e| mistake(glob.span(), format!("is no pattern: {e}")))?;
         let own = |key: &str| table.get(key).map(texts).transpose();
         let set = rule_set(own("rules")?.as_ref().or(rules.as_ref()), own("warn")?.as_ref().or(warn.as_ref()))?;
         config.of_files.push((pattern, set));
@@ -159,17 +161,17 @@ pub fn unknown_view(name: &str) -> String {
 }
 
 /// The folder of `[check.baseline]`.
-fn baseline(value: &Value<'_>) -> Result<String, Fault> {
+fn baseline(value: &Value<'_>) -> Result<String, Mistake> {
     let DeValue::Table(table) = value.get_ref() else {
-        return Err(fault(value.span(), "`baseline` is a table: [check.baseline]"));
+        return Err(mistake(value.span(), "`baseline` is a table: [check.baseline]"));
     };
     check_keys(table, &BASELINE_KEYS)?;
-    let Some(dir) = table.get("dir") else { return Err(fault(value.span(), "[check.baseline] needs a `dir`")) };
+    let Some(dir) = table.get("dir") else { return Err(mistake(value.span(), "[check.baseline] needs a `dir`")) };
     Ok(word(dir)?.0)
 }
 
 /// Refuses keys that are not known.
-fn check_keys(table: &DeTable<'_>, known: &[&'static str]) -> Result<(), Fault> {
+fn check_keys(table: &DeTable<'_>, known: &[&'static str]) -> Result<(), Mistake> {
     let is_known = |key: &&Spanned<DeString<'_>>| known.contains(&key.get_ref().as_ref());
     let Some(key) = table.keys().find(|key| !is_known(key)) else { return Ok(()) };
     let given: String = key.get_ref().chars().take(60).collect();
@@ -177,29 +179,29 @@ fn check_keys(table: &DeTable<'_>, known: &[&'static str]) -> Result<(), Fault> 
     let near = known.iter().copied().min_by_key(distance).filter(|near| distance(near) <= 2);
     let near = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
     let detail = format!("there is no key `{given}`{near} (the keys here are {})", known.join(", "));
-    Err(fault(key.span(), detail))
+    Err(mistake(key.span(), detail))
 }
 
-fn list<'v, 't>(value: &'v Value<'t>) -> Result<Vec<&'v Value<'t>>, Fault> {
+fn list<'v, 't>(value: &'v Value<'t>) -> Result<Vec<&'v Value<'t>>, Mistake> {
     match value.get_ref() {
         DeValue::Array(list) => Ok(list.iter().collect()),
-        _ => Err(fault(value.span(), "a list is needed: [\"watertight\"]")),
+        _ => Err(mistake(value.span(), "a list is needed: [\"watertight\"]")),
     }
 }
 
-fn word(value: &Value<'_>) -> Result<(String, Range<usize>), Fault> {
+fn word(value: &Value<'_>) -> Result<(String, Range<usize>), Mistake> {
     match value.get_ref() {
         DeValue::String(text) => Ok((text.to_string(), value.span())),
-        _ => Err(fault(value.span(), "a text in quotes is needed")),
+        _ => Err(mistake(value.span(), "a text in quotes is needed")),
     }
 }
 
-fn texts(value: &Value<'_>) -> Result<Texts, Fault> {
+fn texts(value: &Value<'_>) -> Result<Texts, Mistake> {
     list(value)?.into_iter().map(word).collect()
 }
 
 /// The rules of two lists. A mistake is told at the rule that makes it.
-fn rule_set(rules: Option<&Texts>, warn: Option<&Texts>) -> Result<RuleSet, Fault> {
+fn rule_set(rules: Option<&Texts>, warn: Option<&Texts>) -> Result<RuleSet, Mistake> {
     fn of(list: Option<&Texts>) -> &[(String, Range<usize>)] {
         list.map_or(&[], Vec::as_slice)
     }
@@ -212,6 +214,6 @@ fn rule_set(rules: Option<&Texts>, warn: Option<&Texts>) -> Result<RuleSet, Faul
         let in_rules = (1..=rules.len()).find(|&n| parse(&rules[..n], &[]).is_err()).map(|n| &rules[n - 1]);
         let in_warn = || (1..=warn.len()).find(|&n| parse(rules, &warn[..n]).is_err()).map(|n| &warn[n - 1]);
         let span = in_rules.or_else(in_warn).map(|(_, span)| span.clone()).unwrap_or_default();
-        fault(span, error.to_string())
+        mistake(span, error.to_string())
     })
 }

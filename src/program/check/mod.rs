@@ -11,6 +11,7 @@ mod since;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum, ValueHint};
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC};
 
 use super::format_arg::FormatArg;
 use super::settings::LimitSettings;
@@ -23,6 +24,9 @@ use meshsnap_render::import::Format;
 use pictures::view_of;
 use reports::ReportArgs;
 use run::Run;
+
+/// Bytes that are escaped in a segment of a URI: all but unreserved ones (RFC 3986, 2.3).
+const SEGMENT: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
 
 /// Examples at the end of `--help`.
 pub const EXAMPLES: &str = "\

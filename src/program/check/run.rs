@@ -25,7 +25,7 @@ use meshsnap_inspect::check::{self, Check, Verdict, unopened};
 use meshsnap_inspect::opened::{self, Opened};
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::backend::{Backends, GpuHost, HardwareHint};
-use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_render::pluralise::pluralise;
 use meshsnap_render::spec::NamedView;
 use meshsnap_server::config::{cores, why_no_gpu};
@@ -65,7 +65,7 @@ struct Judged {
 
 /// The findings of a run.
 #[derive(Default)]
-struct Found {
+struct RunFindings {
     verdicts: Vec<Verdict>,
     /// The pictures of each verdict.
     pictures: Vec<Vec<ViewPictures>>,
@@ -111,7 +111,7 @@ impl<'a> Run<'a> {
         let threads = self.arguments.jobs.map_or(cores() as usize, usize::from).min(self.tasks.all.len());
         let next = AtomicUsize::new(0);
         let (sender, outcomes) = channel();
-        let Found { verdicts, pictures, lost, failure } = std::thread::scope(|scope| {
+        let RunFindings { verdicts, pictures, lost, failure } = std::thread::scope(|scope| {
             for _ in 0..threads {
                 let (sender, next) = (sender.clone(), &next);
                 scope.spawn(move || {
@@ -195,7 +195,7 @@ impl<'a> Run<'a> {
                 digest = Some(Digest::of(&own.bytes).to_string());
             }
             paths = named.bundle.files().iter().map(|file| file.path.clone()).collect();
-            opened::open(&named.bundle, format, &self.limits, &Deadline::default())
+            opened::open(&named.bundle, format, &self.limits, Budget::new(&self.limits), &Deadline::default())
         });
         let Read { value: opened, names, unread } = match read {
             Ok(read) => read,
@@ -263,8 +263,8 @@ impl<'a> Run<'a> {
     }
 
     /// Prints the verdicts in order, and returns all.
-    fn print(&self, outcomes: &Receiver<(usize, Outcome)>) -> Result<Found, CliError> {
-        let mut found = Found::default();
+    fn print(&self, outcomes: &Receiver<(usize, Outcome)>) -> Result<RunFindings, CliError> {
+        let mut found = RunFindings::default();
         let bar = Bar::start(self.tasks.all.len() as u64);
         let mut waiting: BTreeMap<usize, Outcome> = BTreeMap::new();
         let mut next = 0;

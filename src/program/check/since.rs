@@ -7,9 +7,11 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use percent_encoding::utf8_percent_encode;
+
+use super::SEGMENT;
 use crate::error::CliError;
 use crate::render::{Task, Tasks, is_companion};
-use meshsnap_server::percent;
 
 /// The largest mesh in which names of files are looked for, bytes. A larger one counts as changed with any file beside it.
 const SEARCHED_BYTES_MAX: u64 = 256 << 20;
@@ -60,7 +62,7 @@ fn names_any(mesh: &Path, files: &[&PathBuf]) -> bool {
 /// The base name of a file, as texts may spell it, in lower case.
 fn spellings(file: &Path) -> Vec<Vec<u8>> {
     let name = file.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let encoded = percent::encoded(&name, b"").to_ascii_lowercase();
+    let encoded = utf8_percent_encode(&name, SEGMENT).to_string().to_ascii_lowercase();
     // glTF is JSON, which may escape what is not ASCII.
     let escaped = name.encode_utf16().map(|unit| match u8::try_from(unit) {
         Ok(byte) if byte.is_ascii() => char::from(byte).to_string(),

@@ -12,7 +12,7 @@ use meshsnap_inspect::opened::{self, Opened, Side};
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::backend::{Backends, GpuHost, HardwareHint};
 use meshsnap_render::import::Options;
-use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_render::request::{self, Rules};
 use meshsnap_render::spec::{BackendChoice, Spec};
 use meshsnap_server::config::{cores, why_no_gpu};
@@ -61,7 +61,8 @@ fn read(arguments: &DiffArgs, name: &str, limits: &Limits) -> Result<NamedFiles,
 
 fn open(arguments: &DiffArgs, name: &str, named: &NamedFiles, limits: &Limits) -> Result<Opened, CliError> {
     let format = arguments.format_in.format();
-    opened::open(&named.bundle, format, limits, &Deadline::default()).map_err(|error| CliError::from(error).about(name))
+    opened::open(&named.bundle, format, limits, Budget::new(limits), &Deadline::default())
+        .map_err(|error| CliError::from(error).about(name))
 }
 
 /// True if both are the same files, whatever the folder and the name of the mesh.

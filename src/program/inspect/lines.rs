@@ -19,7 +19,7 @@ use meshsnap_inspect::report;
 use meshsnap_inspect::report::Report;
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::import::Options;
-use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_server::config::cores;
 
 /// A line: the path, and the report or the reason why there is none.
@@ -108,7 +108,16 @@ impl Run<'_> {
         let companions = Companions { named: &self.named, all: task.has_folder };
         let read = siblings::read_on(&task.mesh, companions, &self.limits, |named| {
             let extras = self.arguments.extras();
-            report::inspect(&named.bundle, self.options, extras, &self.limits, &Deadline::default(), &mut |_| ())
+            let mut budget = Budget::new(&self.limits);
+            report::inspect(
+                &named.bundle,
+                self.options,
+                extras,
+                &self.limits,
+                &mut budget,
+                &Deadline::default(),
+                &mut |_| (),
+            )
         })?;
         read.value.map_err(|error| CliError::from(error).about(&task.mesh))
     }

@@ -13,7 +13,7 @@ use crate::error::CliError;
 use meshsnap_inspect::report;
 use meshsnap_inspect::report::Extras;
 use meshsnap_render::import::{self, Format};
-use meshsnap_render::limits::Deadline;
+use meshsnap_render::limits::{Budget, Deadline};
 use meshsnap_render::request::{self, Rules};
 use meshsnap_render::spec::BackendChoice;
 
@@ -93,9 +93,17 @@ pub fn run(arguments: &InspectArgs) -> Result<(), CliError> {
     let (paths, archives) = named.paths();
     progress.next("parsing");
     let mut parsed = |_| progress.next("counting edges");
-    let report =
-        report::inspect(&named.bundle, options, arguments.extras(), &limits, &Deadline::default(), &mut parsed)
-            .map_err(|error| CliError::from(error).about(mesh_name))?;
+    let mut budget = Budget::new(&limits);
+    let report = report::inspect(
+        &named.bundle,
+        options,
+        arguments.extras(),
+        &limits,
+        &mut budget,
+        &Deadline::default(),
+        &mut parsed,
+    )
+    .map_err(|error| CliError::from(error).about(mesh_name))?;
     drop(progress);
     for sentence in bundle::unused(&paths, &named.file_use, |path| archives.iter().any(|archive| archive == path)) {
         say!("meshsnap: {sentence}");

@@ -18,8 +18,8 @@ use crate::output::{Destination, Inputs};
 use crate::siblings::{self, Read};
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::backend::{Backends, GpuHost, HardwareHint};
-use meshsnap_render::limits::{Deadline, Limits};
-use meshsnap_render::pipeline::{self, Job, Output};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::pipeline::{self, Context, Job, Output};
 use meshsnap_render::spec::Spec;
 use meshsnap_server::config::{cores, why_no_gpu};
 
@@ -120,7 +120,8 @@ impl Batch<'_> {
         let Read { value: drawn, names, unread } = siblings::read_on(&task.mesh, companions, &self.limits, |named| {
             let format_in = format_in(self.arguments.format_in.as_deref());
             let job = Job { bundle: named.bundle.clone(), format_in, spec: &self.spec };
-            pipeline::render(job, backends, &self.limits, &Deadline::default(), &mut |_| {})
+            let (budget, deadline) = (Budget::new(&self.limits), &Deadline::default());
+            pipeline::render(job, &self.limits, Context { backends, budget, deadline, ended: &mut |_| {} })
         })?;
         let drawn = drawn.map_err(|error| one::of_mesh(error, &task.mesh, &|| advice(task, &unread)))?;
         self.write(task, &drawn, &names, shared)?;

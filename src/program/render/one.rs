@@ -14,8 +14,8 @@ use crate::siblings;
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::backend::{Backends, GpuHost, HardwareHint};
 use meshsnap_render::import::{FileUse, MeshFault, Options};
-use meshsnap_render::limits::{Deadline, Limits};
-use meshsnap_render::pipeline::{self, Job, RenderError, Stage};
+use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::pipeline::{self, Context, Job, RenderError, Stage};
 use meshsnap_render::spec::Spec;
 use meshsnap_render::warning::Warning;
 use meshsnap_server::config::{cores, why_no_gpu};
@@ -64,7 +64,9 @@ impl Drawing<'_> {
         let drawing = Arc::new(DrawingThreads::new(threads));
         let drawn = drawing.install(|| {
             let mut backends = Backends::sharing(gpu.clone(), drawing.clone());
-            pipeline::render(job, &mut backends, limits, &Deadline::default(), &mut ended)
+            let (budget, deadline) = (Budget::new(limits), &Deadline::default());
+            let context = Context { backends: &mut backends, budget, deadline, ended: &mut ended };
+            pipeline::render(job, limits, context)
         });
         drop(progress);
         let beside = || self.advice(&names, &common, &file_use);

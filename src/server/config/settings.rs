@@ -60,7 +60,7 @@ pub const SETTINGS: &[Setting] = &[
     number("worker-threads", "Threads within one CPU render; 0: the workers share the cores", 0, 1024, |c| {
         &mut c.worker_threads
     }),
-    number("queue", "Most jobs of a class that wait for each worker", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
+    number("queue", "Most jobs of a class that wait for each worker", 0, 1 << 20, |c| &mut c.queue_per_worker),
     text("backend", "Back-end of requests that name none: auto, gpu or cpu", set_backend, |c| {
         word_for(c.backend).into()
     }),
@@ -160,7 +160,7 @@ pub const SETTINGS: &[Setting] = &[
         |c| c.log.clone(),
     ),
     text("log-format", "Format of the log: auto, text or json", set_log_format, |c| word(LOG_FORMATS, c.log_json)),
-    number("limit-body-bytes", "Largest request body", 1, u64::MAX, |c| &mut c.limits.body_bytes),
+    number("limit-body-bytes", "Largest request body", 1, u64::MAX, |c| &mut c.body_bytes),
     number("limit-memory-bytes", "Most bytes of memory for one job", 1, u64::MAX, |c| &mut c.limits.memory_bytes),
     number("limit-triangles", "Most triangles of one mesh", 1, u64::MAX, |c| &mut c.limits.triangles),
     number("limit-nodes", "Most nodes of one scene graph", 1, u64::MAX, |c| &mut c.limits.nodes),
@@ -175,8 +175,7 @@ pub const SETTINGS: &[Setting] = &[
     }),
     number("limit-bundle-bytes", "Most bytes of a bundle, unpacked", 1, u64::MAX, |c| &mut c.limits.bundle_bytes),
     number("limit-bundle-entries", "Most files of a bundle", 1, 1 << 16, |c| &mut c.limits.bundle_entries),
-    number("limit-job-ms", "Longest time for one job, once a worker has begun it", 1, MS_MAX, |c| &mut c.limits.job_ms),
-    number("limit-queue-per-worker", "The same as --queue", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
+    number("limit-job-ms", "Longest time for one job, once a worker has begun it", 1, MS_MAX, |c| &mut c.job_ms),
 ];
 
 impl Setting {

@@ -1,14 +1,20 @@
 //! Addresses of pictures of stored meshes, and their tags.
 
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
+
 use super::state::AppState;
 use crate::digest::Digest;
-use crate::percent;
 use crate::store::Reading;
 use meshsnap_render::image::ImageFormat;
 use meshsnap_render::spec::{BackendChoice, Spec};
 
 /// Longest address that is given out: proxies and browsers may refuse longer ones.
 const URL_BYTES_MAX: usize = 2000;
+
+/// Bytes that are escaped in a query: all but unreserved ones (RFC 3986, 2.3) and those that vectors, sheets and names of files
+/// have.
+const ESCAPED: &AsciiSet =
+    &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~').remove(b',').remove(b':').remove(b'/');
 
 /// The address at which a picture can be fetched again.
 pub struct Address {
@@ -36,8 +42,8 @@ impl Address {
         let format_in = reading.format_in.map(|format| ("format_in", format.name()));
         let entry = reading.entry.as_deref().map(|entry| ("entry", entry));
         let keys = keys.iter().map(|(key, text)| (key.as_str(), text.as_str())).chain(format_in).chain(entry);
-        let query: Vec<String> =
-            keys.map(|(key, text)| [key, text].map(|part| percent::encoded(part, b",:/")).join("=")).collect();
+        let escaped = |part| utf8_percent_encode(part, ESCAPED);
+        let query: Vec<String> = keys.map(|(key, text)| format!("{}={}", escaped(key), escaped(text))).collect();
         let mark = if query.is_empty() { "" } else { "?" };
         let url = format!("/v1/meshes/{digest}/render.{extension}{mark}{}", query.join("&"));
         (url.len() <= URL_BYTES_MAX).then(|| Self { url, etag: render_key(state, digest, reading, spec) })

@@ -1,4 +1,6 @@
 //! `ETag`, `If-None-Match` and `Cache-Control`.
+//!
+//! The crate `headers` would save two lines, and bring older versions of base64 and SHA-1 with it.
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 

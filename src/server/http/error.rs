@@ -1,6 +1,6 @@
 //! The only map from errors to HTTP statuses.
 //!
-//! Handlers name who is at fault ([`Fault`]), never a status. An [`ApiError`] becomes an answer in
+//! Handlers name the kind of an error ([`ErrorKind`]), never a status. An [`ApiError`] becomes an answer in
 //! two steps: status and headers here, the body in [`super::middleware::observe`], because the
 //! request's id is only known there.
 
@@ -20,7 +20,7 @@ use meshsnap_render::request::RequestError;
 
 /// Kinds of errors, by who is at fault. Each has one status.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
+pub enum ErrorKind {
     /// The request is malformed: query, document, form or header.
     BadRequest,
     /// The request has no valid API key.
@@ -57,7 +57,7 @@ pub enum Fault {
     Framework(StatusCode),
 }
 
-impl Fault {
+impl ErrorKind {
     /// The HTTP status.
     pub fn status(self) -> StatusCode {
         match self {
@@ -82,14 +82,14 @@ impl Fault {
     }
 }
 
-/// The faults by which jobs fail, under their names in the data folder.
-const FAULTS_OF_JOBS: &[(&str, Fault)] = &[
-    ("bad-request", Fault::BadRequest),
-    ("unknown-format", Fault::UnknownFormat),
-    ("content", Fault::Content),
-    ("unavailable", Fault::Unavailable),
-    ("deadline", Fault::Deadline),
-    ("internal", Fault::Internal),
+/// The kinds of errors by which jobs fail, under their names in the data folder.
+const KINDS_OF_JOBS: &[(&str, ErrorKind)] = &[
+    ("bad-request", ErrorKind::BadRequest),
+    ("unknown-format", ErrorKind::UnknownFormat),
+    ("content", ErrorKind::Content),
+    ("unavailable", ErrorKind::Unavailable),
+    ("deadline", ErrorKind::Deadline),
+    ("internal", ErrorKind::Internal),
 ];
 
 /// A failure as it is stored.
@@ -99,7 +99,7 @@ pub fn record(failure: &Failure) -> ErrorRecord {
 
 /// An error as it is stored.
 pub fn record_of(error: ApiError) -> ErrorRecord {
-    let fault = FAULTS_OF_JOBS.iter().find(|(_, fault)| *fault == error.fault).map_or("internal", |(name, _)| name);
+    let fault = KINDS_OF_JOBS.iter().find(|(_, kind)| *kind == error.kind).map_or("internal", |(name, _)| name);
     let flag = error.flag.map(str::to_owned);
     ErrorRecord { fault: fault.to_owned(), code: error.code.to_owned(), detail: error.detail, flag }
 }
@@ -111,8 +111,8 @@ pub struct IsAnswer;
 /// An error as a client sees it.
 #[derive(Clone, Debug)]
 pub struct ApiError {
-    /// The party at fault; the status follows from it.
-    pub fault: Fault,
+    /// Its kind; the status follows from it.
+    pub kind: ErrorKind,
     /// The error's stable name, in snake case.
     pub code: &'static str,
     /// One sentence: what is wrong, where, what to do. It never tells the server's internals.
@@ -125,8 +125,8 @@ pub struct ApiError {
 
 impl ApiError {
     /// An error without a flag and without headers of its own.
-    pub fn new(fault: Fault, code: &'static str, detail: impl Into<String>) -> Self {
-        Self { fault, code, detail: detail.into(), flag: None, headers: Vec::new() }
+    pub fn new(kind: ErrorKind, code: &'static str, detail: impl Into<String>) -> Self {
+        Self { kind, code, detail: detail.into(), flag: None, headers: Vec::new() }
     }
 
     /// Adds `Retry-After`.
@@ -150,13 +150,13 @@ impl ApiError {
     /// A bug of the server. The cause is in the log and not in the answer.
     pub fn internal() -> Self {
         let detail = "something failed here that was not the request's fault; the log has more under this request id";
-        Self::new(Fault::Internal, "internal", detail)
+        Self::new(ErrorKind::Internal, "internal", detail)
     }
 
     /// The body is larger than is accepted.
     pub fn body_too_large(limit: u64) -> Self {
         let detail = format!("the request body is larger than {limit} bytes (raise the limit with --limit-body-bytes)");
-        Self::new(Fault::TooLarge, "body_too_large", detail).flag("--limit-body-bytes")
+        Self::new(ErrorKind::TooLarge, "body_too_large", detail).flag("--limit-body-bytes")
     }
 
     /// The body is larger than the memory for all uploads.
@@ -165,17 +165,17 @@ impl ApiError {
             "the request body is larger than {limit} bytes, the memory for all uploads (raise it with --uploads-bytes, and \
              --memory-bytes where that is less than four times as much)"
         );
-        Self::new(Fault::TooLarge, "body_too_large", detail).flag("--uploads-bytes")
+        Self::new(ErrorKind::TooLarge, "body_too_large", detail).flag("--uploads-bytes")
     }
 
     /// The server shuts down and takes no new work.
     pub fn draining(detail: impl Into<String>) -> Self {
-        Self::new(Fault::Unavailable, "draining", detail).retry_after(5)
+        Self::new(ErrorKind::Unavailable, "draining", detail).retry_after(5)
     }
 
     /// The path names nothing.
     pub fn not_found(detail: impl Into<String>) -> Self {
-        Self::new(Fault::NotFound, "not_found", detail)
+        Self::new(ErrorKind::NotFound, "not_found", detail)
     }
 
     /// An error that the framework answered by itself.
@@ -183,23 +183,23 @@ impl ApiError {
         match status {
             StatusCode::METHOD_NOT_ALLOWED => {
                 let detail = "this path does not answer to this method; the Allow header says to which it does";
-                Self::new(Fault::MethodNotAllowed, "method_not_allowed", detail)
+                Self::new(ErrorKind::MethodNotAllowed, "method_not_allowed", detail)
             }
             StatusCode::INTERNAL_SERVER_ERROR => Self::internal(),
             _ => {
                 let detail = status.canonical_reason().unwrap_or("the request failed");
-                Self::new(Fault::Framework(status), "bad_request", detail)
+                Self::new(ErrorKind::Framework(status), "bad_request", detail)
             }
         }
     }
 
     /// The HTTP status.
     pub fn status(&self) -> StatusCode {
-        self.fault.status()
+        self.kind.status()
     }
 
     fn deadline(detail: String) -> Self {
-        Self::new(Fault::Deadline, "deadline", detail).flag("--limit-job-ms")
+        Self::new(ErrorKind::Deadline, "deadline", detail).flag("--limit-job-ms")
     }
 }
 
@@ -214,7 +214,7 @@ impl IntoResponse for ApiError {
 
 impl From<RequestError> for ApiError {
     fn from(error: RequestError) -> Self {
-        Self::new(Fault::BadRequest, error.fault.code(), error.to_string()).flag(error.flag)
+        Self::new(ErrorKind::BadRequest, error.fault.code(), error.to_string()).flag(error.flag)
     }
 }
 
@@ -223,7 +223,7 @@ impl From<Refusal> for ApiError {
         let detail = refusal.to_string();
         match refusal {
             Refusal::QueueFull { retry_after_s, .. } => {
-                let error = Self::new(Fault::Busy, "queue_full", detail);
+                let error = Self::new(ErrorKind::Busy, "queue_full", detail);
                 error.flag("--queue").retry_after(retry_after_s)
             }
             Refusal::TooLate { class, retry_after_s, .. } => {
@@ -231,14 +231,14 @@ impl From<Refusal> for ApiError {
                     Class::Interactive => "--wait-ms",
                     Class::Batch => "--batch-wait-ms",
                 };
-                Self::new(Fault::Busy, "too_late", detail).flag(flag).retry_after(retry_after_s)
+                Self::new(ErrorKind::Busy, "too_late", detail).flag(flag).retry_after(retry_after_s)
             }
             Refusal::MemoryFull { retry_after_s, .. } => {
-                Self::new(Fault::Busy, "memory_full", detail).flag("--memory-bytes").retry_after(retry_after_s)
+                Self::new(ErrorKind::Busy, "memory_full", detail).flag("--memory-bytes").retry_after(retry_after_s)
             }
-            Refusal::TooMany { .. } => Self::new(Fault::Content, "too_many_meshes", detail).flag("--queue"),
-            Refusal::TooMuch { .. } => Self::new(Fault::Content, "too_many_meshes", detail).flag("--batch-wait-ms"),
-            Refusal::Quarantined { .. } => Self::new(Fault::Content, "mesh_quarantined", detail),
+            Refusal::TooMany { .. } => Self::new(ErrorKind::Content, "too_many_meshes", detail).flag("--queue"),
+            Refusal::TooMuch { .. } => Self::new(ErrorKind::Content, "too_many_meshes", detail).flag("--batch-wait-ms"),
+            Refusal::Quarantined { .. } => Self::new(ErrorKind::Content, "mesh_quarantined", detail),
             Refusal::Unstored(unstored) => unstored.into(),
             Refusal::Draining => Self::draining(detail),
         }
@@ -251,14 +251,14 @@ impl From<Unstored> for ApiError {
             Unstored::Full => "storage_full",
             Unstored::Failed => "storage_failed",
         };
-        Self::new(Fault::NoRoom, code, unstored.to_string()).retry_after(5)
+        Self::new(ErrorKind::NoRoom, code, unstored.to_string()).retry_after(5)
     }
 }
 
 impl From<&ErrorRecord> for ApiError {
     fn from(record: &ErrorRecord) -> Self {
-        let known = FAULTS_OF_JOBS.iter().find(|(name, _)| *name == record.fault);
-        let error = Self::new(known.map_or(Fault::Internal, |(_, fault)| *fault), name(&record.code), &record.detail);
+        let known = KINDS_OF_JOBS.iter().find(|(name, _)| *name == record.fault);
+        let error = Self::new(known.map_or(ErrorKind::Internal, |(_, kind)| *kind), name(&record.code), &record.detail);
         error.flag(record.flag.as_deref().map(name))
     }
 }
@@ -269,7 +269,7 @@ impl From<TooMuch> for ApiError {
             TooMuch::Rate { .. } => ("rate_limited", "--rate-per-s"),
             TooMuch::Day { .. } => ("quota_exceeded", "--quota-per-day"),
         };
-        Self::new(Fault::Busy, code, much.to_string()).flag(flag).retry_after(much.retry_after_s())
+        Self::new(ErrorKind::Busy, code, much.to_string()).flag(flag).retry_after(much.retry_after_s())
     }
 }
 
@@ -279,7 +279,7 @@ impl From<MemoryFull> for ApiError {
             MemoryFull::Account { account, .. } => ("uploads_full", account.flag()),
             MemoryFull::Process { .. } => ("memory_full", "--memory-bytes"),
         };
-        Self::new(Fault::Busy, code, full.to_string()).flag(flag).retry_after(1)
+        Self::new(ErrorKind::Busy, code, full.to_string()).flag(flag).retry_after(1)
     }
 }
 
@@ -287,9 +287,11 @@ impl From<StoreError> for ApiError {
     fn from(error: StoreError) -> Self {
         let detail = error.to_string();
         match error {
-            StoreError::TooLarge { .. } => Self::new(Fault::TooLarge, "mesh_too_large", detail).flag("--mesh-bytes"),
-            StoreError::Full => Self::new(Fault::Busy, "memory_full", detail).flag("--memory-bytes").retry_after(1),
-            StoreError::Busy { flag } => Self::new(Fault::Busy, "meshes_full", detail).flag(flag).retry_after(1),
+            StoreError::TooLarge { .. } => {
+                Self::new(ErrorKind::TooLarge, "mesh_too_large", detail).flag("--mesh-bytes")
+            }
+            StoreError::Full => Self::new(ErrorKind::Busy, "memory_full", detail).flag("--memory-bytes").retry_after(1),
+            StoreError::Busy { flag } => Self::new(ErrorKind::Busy, "meshes_full", detail).flag(flag).retry_after(1),
         }
     }
 }
@@ -299,7 +301,7 @@ impl From<&Failure> for ApiError {
         match failure {
             Failure::Render(error) => error.into(),
             Failure::TimeUp { .. } => Self::deadline(failure.to_string()),
-            Failure::Crashed { .. } => Self::new(Fault::Content, "crashed", failure.to_string()),
+            Failure::Crashed { .. } => Self::new(ErrorKind::Content, "crashed", failure.to_string()),
             Failure::Recorded(record) => record.into(),
             Failure::Panicked | Failure::Lost => Self::internal(),
         }
@@ -315,17 +317,17 @@ impl From<&RenderError> for ApiError {
             RenderError::Draw(DrawError::Stopped(stopped)) => Self::deadline(stopped.to_string()),
             RenderError::Draw(DrawError::DeviceLost(_)) => {
                 let detail = "the GPU of this server was lost while drawing; try again, or ask for backend=cpu";
-                Self::new(Fault::Unavailable, "device_lost", detail).retry_after(1)
+                Self::new(ErrorKind::Unavailable, "device_lost", detail).retry_after(1)
             }
             // Only with `backend=gpu`: `auto` goes on with the CPU.
             RenderError::Draw(DrawError::NoGpu(_)) => {
                 let detail = "this server has no GPU that can be used; ask for backend=auto or backend=cpu \
                               (backend.gpu at /v1/capabilities says why)";
-                Self::new(Fault::Content, "backend_unavailable", detail)
+                Self::new(ErrorKind::Content, "backend_unavailable", detail)
             }
             RenderError::Draw(_) => {
                 let detail = "the GPU of this server cannot draw this; ask for backend=auto or backend=cpu";
-                Self::new(Fault::Content, "backend_unavailable", detail)
+                Self::new(ErrorKind::Content, "backend_unavailable", detail)
             }
             RenderError::Encode(_) => Self::internal(),
         }
@@ -339,31 +341,31 @@ impl From<&PlanError> for ApiError {
             PlanError::Stopped(stopped) => return Self::deadline(stopped.to_string()),
             PlanError::NoCamera => "no_camera",
         };
-        Self::new(Fault::Content, code, error.to_string())
+        Self::new(ErrorKind::Content, code, error.to_string())
     }
 }
 
 impl From<&MeshError> for ApiError {
     fn from(error: &MeshError) -> Self {
-        let (fault, code) = match &error.fault {
-            MeshFault::Unrecognised => (Fault::UnknownFormat, "mesh_unrecognised"),
-            MeshFault::Broken => (Fault::Content, "mesh_broken"),
-            MeshFault::Empty => (Fault::Content, "mesh_empty"),
-            MeshFault::OutsideBundle => (Fault::Content, "mesh_outside_bundle"),
-            MeshFault::BundleBroken => (Fault::Content, "bundle_broken"),
-            MeshFault::EntryUnclear => (Fault::Content, "entry_unclear"),
-            MeshFault::DecoderFailed => (Fault::Content, "decoder_failed"),
-            MeshFault::DecoderCrashed => (Fault::Content, "decoder_crashed"),
-            MeshFault::Unsupported => (Fault::Content, "mesh_unsupported"),
+        let (kind, code) = match &error.fault {
+            MeshFault::Unrecognised => (ErrorKind::UnknownFormat, "mesh_unrecognised"),
+            MeshFault::Broken => (ErrorKind::Content, "mesh_broken"),
+            MeshFault::Empty => (ErrorKind::Content, "mesh_empty"),
+            MeshFault::OutsideBundle => (ErrorKind::Content, "mesh_outside_bundle"),
+            MeshFault::BundleBroken => (ErrorKind::Content, "bundle_broken"),
+            MeshFault::EntryUnclear => (ErrorKind::Content, "entry_unclear"),
+            MeshFault::DecoderFailed => (ErrorKind::Content, "decoder_failed"),
+            MeshFault::DecoderCrashed => (ErrorKind::Content, "decoder_crashed"),
+            MeshFault::Unsupported => (ErrorKind::Content, "mesh_unsupported"),
             MeshFault::Limit(limit) => return limit.into(),
             MeshFault::Stopped => return Self::deadline(error.detail.clone()),
         };
-        Self::new(fault, code, error.detail.clone())
+        Self::new(kind, code, error.detail.clone())
     }
 }
 
 impl From<&LimitExceeded> for ApiError {
     fn from(limit: &LimitExceeded) -> Self {
-        Self::new(Fault::Content, "limit_exceeded", limit.to_string()).flag(limit.flag)
+        Self::new(ErrorKind::Content, "limit_exceeded", limit.to_string()).flag(limit.flag)
     }
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::watch;
 
-use super::error::{ApiError, Fault};
+use super::error::{ApiError, ErrorKind};
 use crate::jobs::Owner;
 
 /// Most streams that one client has open.
@@ -17,8 +17,8 @@ pub struct EventStreams {
     closing: watch::Sender<bool>,
 }
 
-/// The place of one stream. It is free again when this is dropped.
-pub struct Place {
+/// One stream of a client, which counts until this is dropped.
+pub struct OpenStream {
     owner: Owner,
     open: Arc<Mutex<HashMap<Owner, usize>>>,
     closing: watch::Receiver<bool>,
@@ -30,18 +30,18 @@ impl EventStreams {
         Self { open: Arc::default(), closing: watch::Sender::new(false) }
     }
 
-    /// Takes a place for a client.
-    pub fn open(&self, owner: &Owner) -> Result<Place, ApiError> {
+    /// Opens a stream for a client, if it may have one more.
+    pub fn open(&self, owner: &Owner) -> Result<OpenStream, ApiError> {
         let mut open = lock(&self.open);
         let count = open.entry(owner.clone()).or_default();
         if *count >= STREAMS_OF_OWNER_MAX {
             let detail = format!(
                 "this client has {STREAMS_OF_OWNER_MAX} event streams open, and no more are allowed; close one"
             );
-            return Err(ApiError::new(Fault::Busy, "streams_full", detail).retry_after(1));
+            return Err(ApiError::new(ErrorKind::Busy, "streams_full", detail).retry_after(1));
         }
         *count += 1;
-        Ok(Place { owner: owner.clone(), open: self.open.clone(), closing: self.closing.subscribe() })
+        Ok(OpenStream { owner: owner.clone(), open: self.open.clone(), closing: self.closing.subscribe() })
     }
 
     /// Ends all streams.
@@ -50,7 +50,7 @@ impl EventStreams {
     }
 }
 
-impl Place {
+impl OpenStream {
     /// Returns when all streams end.
     pub async fn closing(&mut self) {
         // An error says that the server is gone.
@@ -58,7 +58,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for OpenStream {
     fn drop(&mut self) {
         let mut open = lock(&self.open);
         if let Some(count) = open.get_mut(&self.owner) {

@@ -128,7 +128,7 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
         signals.next().await;
         let drained = async {
             leave(&state, Duration::from_millis(config.drain_delay_ms)).await;
-            drain(&state, Duration::from_millis(config.limits.job_ms) + DRAIN_GRACE).await;
+            drain(&state, Duration::from_millis(config.job_ms) + DRAIN_GRACE).await;
         };
         tokio::select! {
             () = drained => {}

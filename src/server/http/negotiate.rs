@@ -1,11 +1,14 @@
 //! The preferences of a client: `Accept` and `Prefer`.
+//!
+//! `Accept` is read here because `headers` does not read it, and `headers-accept` differs in two ways: of forms that are liked
+//! equally it takes the client's first and not ours, and one malformed range makes it drop the header.
 
 use std::time::Duration;
 
 use axum::http::{HeaderMap, header};
 
 use super::dto::media_type;
-use super::error::{ApiError, Fault};
+use super::error::{ApiError, ErrorKind};
 use crate::jobs::Media;
 use meshsnap_render::image::ImageFormat;
 
@@ -44,7 +47,7 @@ fn picture_format(media: Media) -> Option<ImageFormat> {
 }
 
 fn not_acceptable(detail: &str) -> ApiError {
-    ApiError::new(Fault::NotAcceptable, "not_acceptable", detail).header(header::VARY, "accept")
+    ApiError::new(ErrorKind::NotAcceptable, "not_acceptable", detail).header(header::VARY, "accept")
 }
 
 /// The form that a client accepts best. None if it accepts none.

@@ -17,7 +17,6 @@ use crate::jobs::{
 use crate::memory::Account;
 use crate::store::{NewMesh, Reading};
 use meshsnap_render::import::{Bundle, BundleFile, Format};
-use meshsnap_render::limits::Lender;
 use meshsnap_render::request;
 
 /// How often a job may be begun by processes that then ended.
@@ -150,7 +149,7 @@ fn resumed(state: &AppState, recovered: &Recovered, job: &RecoveredJob) -> Resul
     let (format_in, memory, recipe) = (reading.format_in, Arc::new(memory), Some(Arc::new(recipe)));
     let (owner, request_id) = (Owner::new(&record.owner), record.request_id.as_str().into());
     let (claim, own, webhook) = (None, [].into(), record.webhook.as_deref().map(Into::into));
-    let lender = Lender(None);
+    let lender = None;
     Ok((
         Work {
             bundle,

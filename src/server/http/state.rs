@@ -21,7 +21,6 @@ use crate::store::Store;
 use crate::webhooks::Webhooks;
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::backend::{GpuHost, HardwareHint};
-use meshsnap_render::limits::Limits;
 use meshsnap_render::request::Rules;
 
 /// Time without work after which a worker frees the memory in which it draws.
@@ -55,12 +54,18 @@ pub struct AppState {
     pub residents: Arc<Residents>,
     /// Pictures that were drawn.
     pub pictures: Pictures,
+    /// The largest request body, bytes.
+    pub body_bytes_max: u64,
     /// Time limit for reading one request body.
     pub body_timeout: Duration,
     /// Least bytes a second of a request body; 0: any.
     pub least_rate: u64,
     /// Number of worker threads.
     pub workers: u64,
+    /// Jobs of a class that wait per worker.
+    pub queue_per_worker: u64,
+    /// Time limit of a job, milliseconds.
+    pub job_ms_max: u64,
     /// The server can be reached from this machine alone.
     pub is_local: bool,
     /// Origins of pages that may use the interface.
@@ -91,14 +96,13 @@ impl AppState {
         let memory = Memory::new(&memory_limits(config));
         let residents = Arc::new(Residents::new(config.resident_bytes, memory.clone()));
         let renderers = pipeline_renderers(gpu.clone(), threads, config.limits.clone(), residents.clone());
-        let Limits { queue_per_worker, job_ms, .. } = config.limits;
         let metrics = Arc::new(Metrics::new().map_err(std::io::Error::other)?);
         let webhooks = hear_of_ends::start(config, durable.clone(), &metrics)?;
         let settings = JobSettings {
             workers: to_usize(config.workers),
-            queue: to_usize(queue_per_worker.saturating_mul(config.workers)),
+            queue: to_usize(config.queue_per_worker.saturating_mul(config.workers)),
             idle_time: IDLE_TIME,
-            job_time: Duration::from_millis(job_ms),
+            job_time: Duration::from_millis(config.job_ms),
             overdue_grace: Duration::from_millis(config.overdue_grace_ms),
             result_ttl: Duration::from_millis(config.result_ttl_ms),
             interactive_wait: Duration::from_millis(config.wait_ms),
@@ -126,9 +130,12 @@ impl AppState {
             residents,
             pictures: Pictures::new(config.picture_bytes, &memory),
             memory,
+            body_bytes_max: config.body_bytes,
             body_timeout: Duration::from_millis(config.body_timeout_ms),
             least_rate: config.least_rate_bytes,
             workers: config.workers,
+            queue_per_worker: config.queue_per_worker,
+            job_ms_max: config.job_ms,
             is_local,
             cors_origins: config.cors_origins.clone(),
             rates: Rates::new(to_u32(config.rate_per_s), to_u32(config.rate_burst), to_u32(config.quota_per_day)),

@@ -2,15 +2,14 @@
 
 use std::sync::Arc;
 
-use super::error::{ApiError, Fault};
+use super::error::{ApiError, ErrorKind};
 use super::state::AppState;
 use crate::digest::Digest;
 use crate::jobs::{Owner, Task, Work};
 use crate::keys::Access;
-use crate::memory::Share;
+use crate::memory::MemoryShare;
 use crate::store::{Reading, StoredMesh};
 use meshsnap_render::import::Bundle;
-use meshsnap_render::limits::Lender;
 
 /// The stored mesh with this name, if the sender sees it. None is a path segment that is not text.
 pub fn find(state: &AppState, name: Option<&str>, access: &Access) -> Result<Arc<StoredMesh>, ApiError> {
@@ -21,7 +20,7 @@ pub fn find(state: &AppState, name: Option<&str>, access: &Access) -> Result<Arc
 pub fn digest(name: Option<&str>) -> Result<Digest, ApiError> {
     name.and_then(Digest::parse).ok_or_else(|| {
         let detail = "the path names no SHA-256, which is 64 lower-case hexadecimal digits";
-        ApiError::new(Fault::BadRequest, "bad_digest", detail)
+        ApiError::new(ErrorKind::BadRequest, "bad_digest", detail)
     })
 }
 
@@ -29,7 +28,7 @@ pub fn digest(name: Option<&str>) -> Result<Digest, ApiError> {
 pub fn unknown() -> ApiError {
     let detail =
         "no mesh of this name is stored: it never was, or was deleted, or made room for others; send it to /v1/meshes";
-    ApiError::new(Fault::NotFound, "mesh_unknown", detail)
+    ApiError::new(ErrorKind::NotFound, "mesh_unknown", detail)
 }
 
 /// A worker's task on a stored mesh.
@@ -45,7 +44,7 @@ pub fn key(digest: Digest, reading: &Reading) -> String {
 }
 
 /// A worker's task on a bundle that is read in the given way.
-pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<Share>) -> Work {
+pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<MemoryShare>) -> Work {
     let Reading { format_in, entry } = reading;
     Work {
         bundle: bundle.with_entry(entry),
@@ -53,7 +52,7 @@ pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<Share>) ->
         mesh_key: None,
         task,
         memory,
-        lender: Lender(None),
+        lender: None,
         recipe: None,
         owner: Owner::default(),
         request_id: "".into(),

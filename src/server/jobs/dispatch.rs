@@ -9,7 +9,6 @@ use super::registry::{Inner, JobRegistry};
 use super::watchdog::Running;
 use crate::durable::Change;
 use crate::memory::{Account, JobMemory};
-use meshsnap_render::limits::Lender;
 
 /// Time between two looks for memory of a worker that finds none. Other accounts do not tell when they give some back.
 const MEMORY_WAIT: Duration = Duration::from_millis(20);
@@ -40,7 +39,7 @@ impl JobRegistry {
                 let Some(job) = inner.queue.take(may_batch) else { continue };
                 if let Some(mut work) = job.take_work() {
                     let memory = JobMemory::new(share, self.settings.memory.job_max());
-                    work.lender = Lender(Some(memory.clone()));
+                    work.lender = Some(memory.clone());
                     let (bundle, since) = (work.bundle.clone(), Instant::now());
                     inner.running.insert(job.serial, Running { job: job.clone(), bundle, since });
                     job.state.send_replace(JobState::Running);
@@ -89,7 +88,7 @@ impl JobRegistry {
         }
         tracing::info!(job = %job.id, request_id = &*job.request_id, "others have the memory of a job; it is begun again");
         inner.running.remove(&job.serial);
-        work.lender = Lender(None);
+        work.lender = None;
         job.put_work(work);
         job.state.send_replace(JobState::Queued);
         inner.queue.reserve(job.class, &job.owner, job.estimate);

@@ -14,13 +14,13 @@ use super::class::{Class, Owner};
 use super::progress::Progress;
 use crate::digest::Digest;
 use crate::durable::{ErrorRecord, Hold, JobKey};
-use crate::memory::{Account, Keeping, Memory, Share, counted};
+use crate::memory::{Account, Keeping, Memory, MemoryShare, counted};
 use crate::telemetry::traces::Trace;
 use meshsnap_inspect::check::RuleSet;
 use meshsnap_render::backend::{BackendKind, DrawTimes};
 use meshsnap_render::image::ImageFormat;
 use meshsnap_render::import::{Bundle, Format};
-use meshsnap_render::limits::{Deadline, Lender};
+use meshsnap_render::limits::{Budget, Deadline, Lend, Limits};
 use meshsnap_render::pipeline::{DrawReport, Output, QualitySelection, RenderError, Stage};
 use meshsnap_render::spec::Spec;
 use meshsnap_render::warning::Warning;
@@ -68,9 +68,9 @@ pub struct Work {
     /// The task on the mesh.
     pub task: Task,
     /// The memory of `bundle`, shared with all other holders of the same bytes.
-    pub memory: Arc<Share>,
+    pub memory: Arc<MemoryShare>,
     /// The memory that a worker borrows for it. None until one begins it.
-    pub lender: Lender,
+    pub lender: Option<Arc<dyn Lend>>,
     /// The request that `task` was read from, so that it can be read again after a restart. None for work that
     /// nobody fetches later.
     pub recipe: Option<Arc<Recipe>>,
@@ -84,6 +84,13 @@ pub struct Work {
     pub claim: Option<Arc<Claim>>,
     /// The address that hears of its end.
     pub webhook: Option<Arc<str>>,
+}
+
+impl Work {
+    /// An unspent budget, of which all that is spent is borrowed as the job's memory.
+    pub fn budget(&self, limits: &Limits) -> Budget {
+        Budget::lent(limits, self.lender.clone())
+    }
 }
 
 /// A request for a picture, as it was sent.
@@ -145,7 +152,7 @@ pub struct Newer {
     /// The mesh and the files beside it.
     pub bundle: Bundle,
     /// The memory of `bundle`.
-    pub memory: Arc<Share>,
+    pub memory: Arc<MemoryShare>,
     /// The bundle's files in the data folder, if they are there already.
     pub holds: Arc<[Arc<Hold>]>,
     /// Its name, if it is stored.
@@ -205,7 +212,7 @@ pub struct Finished {
     /// The encoded picture, or the text of the verdict. Clones share the bytes.
     pub content: Bytes,
     /// The memory of the content, if it is counted.
-    pub memory: Option<Arc<Share>>,
+    pub memory: Option<Arc<MemoryShare>>,
     /// The form of the content.
     pub media: Media,
     /// True for a verdict that is to be answered with 422, as its request asks.

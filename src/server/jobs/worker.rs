@@ -10,7 +10,7 @@ use super::dispatch::Next;
 use super::job::{Checking, Comparing, Failure, Finished, Job, JobState, Product, Task, Timings, Work};
 use super::registry::JobRegistry;
 use crate::priority;
-use crate::residents::{Found, Residents};
+use crate::residents::{FoundMesh, Residents};
 use crate::telemetry::traces;
 use meshsnap_inspect::check::{self, Verdict};
 use meshsnap_inspect::{
@@ -21,7 +21,7 @@ use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::backend::{Backends, GpuHost};
 use meshsnap_render::encode::EncodeError;
 use meshsnap_render::import::{self, Bundle, MeshError, bundle::UNNAMED};
-use meshsnap_render::limits::{Budget, Deadline, Lender, Limits};
+use meshsnap_render::limits::{Budget, Deadline, Lend, Limits};
 use meshsnap_render::pipeline::{self, Context, Model, Output, RenderError, Stage};
 
 /// A worker's renderer, which does one job after the other.
@@ -54,22 +54,27 @@ pub fn pipeline_renderers(
         };
         let (limits, residents) = (limits.clone(), residents.clone());
         Box::new(move |work, deadline, ended| {
-            let Work { bundle, format_in, mesh_key, task, lender, .. } = work;
-            let limits = Limits { lender: lender.clone(), ..limits.clone() };
+            let Work { bundle, format_in, task, .. } = work;
             match task {
                 Task::Draw(spec) => {
                     let job = pipeline::Job { bundle: bundle.clone(), format_in: *format_in, spec };
-                    let (output, mesh_was_kept) = match mesh_key {
+                    let (output, mesh_was_kept) = match &work.mesh_key {
                         Some(key) => {
-                            render_stored((key.as_str(), job), &residents, &mut backends, &limits, deadline, ended)?
+                            let stored = Stored { key, job, lender: &work.lender };
+                            render_stored(stored, &residents, &mut backends, &limits, deadline, ended)?
                         }
-                        None => (pipeline::render(job, &mut backends, &limits, deadline, ended)?, false),
+                        None => {
+                            let budget = work.budget(&limits);
+                            let context = Context { backends: &mut backends, budget, deadline, ended };
+                            (pipeline::render(job, &limits, context)?, false)
+                        }
                     };
                     Ok(Product::Picture { output: Box::new(output), mesh_was_kept })
                 }
                 Task::Inspect { time_s } => {
                     let options = import::Options { format: *format_in, time_s: *time_s, ..import::Options::default() };
-                    let report = report::inspect(bundle, options, Extras::default(), &limits, deadline, ended)?;
+                    let budget = &mut work.budget(&limits);
+                    let report = report::inspect(bundle, options, Extras::default(), &limits, budget, deadline, ended)?;
                     Ok(Product::Report(written(report.json())?))
                 }
                 Task::Check(checking) => judge(work, checking, &limits, deadline, ended),
@@ -79,9 +84,18 @@ pub fn pipeline_renderers(
     })
 }
 
+/// A picture of a mesh that may be in memory.
+struct Stored<'a> {
+    /// The name of the mesh in memory.
+    key: &'a str,
+    job: pipeline::Job<'a>,
+    /// The memory that the job borrows.
+    lender: &'a Option<Arc<dyn Lend>>,
+}
+
 /// As [`pipeline::render`], of a mesh that may be in memory, or stays there. True if it was there.
 fn render_stored(
-    (key, job): (&str, pipeline::Job<'_>),
+    Stored { key, job, lender }: Stored<'_>,
     residents: &Residents,
     backends: &mut Backends,
     limits: &Limits,
@@ -91,20 +105,20 @@ fn render_stored(
     let time_s = job.spec.time_s;
     // Exact, and different for 0 and -0.
     let key = time_s.map_or_else(|| key.to_owned(), |time_s| format!("{key} at {time_s:?} s"));
-    let Found { resident, was_kept } = residents.find(&key, deadline, || {
-        let mut budget = Budget::new(limits);
+    let FoundMesh { resident, was_kept } = residents.find(&key, deadline, || {
+        let mut budget = Budget::lent(limits, lender.clone());
         let options = import::Options { format: job.format_in, time_s, ..import::Options::default() };
         let model = Model::read(&job.bundle, options, limits, &mut budget, deadline)?;
         // From here on it is the memory of a mesh that is kept, if there is room for it.
-        if let Some(lender) = &limits.lender.0 {
+        if let Some(lender) = lender {
             lender.restart();
         }
-        Ok((model, budget.lent_by(&Lender(None), 0)))
+        Ok((model, budget.lent_by(None, 0)))
     })?;
     ended(Stage::Parse);
     // A mesh that is kept has a share of its own.
     let counted = if resident.is_counted() { resident.budget.spent_bytes() } else { 0 };
-    let budget = resident.budget.lent_by(&limits.lender, counted);
+    let budget = resident.budget.lent_by(lender.clone(), counted);
     let context = Context { backends, budget, deadline, ended };
     let output = pipeline::render_model(&resident.model, job.spec, context);
     residents.weigh(&key, &resident);
@@ -125,7 +139,7 @@ fn judge(
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Product, RenderError> {
     let Work { bundle, format_in, .. } = work;
-    let opened = opened::open(bundle, *format_in, limits, deadline);
+    let opened = opened::open(bundle, *format_in, limits, work.budget(limits), deadline);
     ended(Stage::Parse);
     let file = bundle.files().first().filter(|_| bundle.files().len() == 1 && !bundle.is_zip());
     let named = bundle.entry().or(file.map(|file| file.path.as_str()));
@@ -152,7 +166,7 @@ fn compare(
     let Comparing { newer, max_distance, picture, may_fail } = comparing;
     let open = |bundle: &Bundle, side: &str| {
         let about = |error: MeshError| MeshError { detail: format!("{side}: {}", error.detail), ..error };
-        opened::open(bundle, work.format_in, limits, deadline).map_err(about)
+        opened::open(bundle, work.format_in, limits, work.budget(limits), deadline).map_err(about)
     };
     let (a, b) = (open(&work.bundle, "a")?, open(&newer.bundle, "b")?);
     ended(Stage::Parse);

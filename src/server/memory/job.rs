@@ -3,14 +3,14 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::Share;
+use super::MemoryShare;
 use meshsnap_render::limits::Lend;
 
 /// The share of a job, which grows as the job spends. A job that finds no more gives all of it back, and is begun again
 /// when there is as much as a job may take: so no job waits for memory while it holds some.
 #[derive(Debug)]
 pub struct JobMemory {
-    share: Share,
+    share: MemoryShare,
     most: u64,
     peak: AtomicU64,
     /// Bytes that it asked for in vain; 0: none.
@@ -19,7 +19,7 @@ pub struct JobMemory {
 
 impl JobMemory {
     /// The memory of a job that has `share` to begin with.
-    pub fn new(share: Share, most: u64) -> Arc<Self> {
+    pub fn new(share: MemoryShare, most: u64) -> Arc<Self> {
         Arc::new(Self { share, most, peak: AtomicU64::new(0), refused: AtomicU64::new(0) })
     }
 

@@ -15,7 +15,7 @@ mod tests;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 pub use job::JobMemory;
-pub use share::{Counted, Keeping, Share, counted};
+pub use share::{Counted, Keeping, MemoryShare, counted};
 
 /// Uses of memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,8 +154,8 @@ impl Memory {
     }
 
     /// An empty share of an account.
-    pub fn share(self: &Arc<Self>, account: Account) -> Share {
-        Share::new(self.clone(), account)
+    pub fn share(self: &Arc<Self>, account: Account) -> MemoryShare {
+        MemoryShare::new(self.clone(), account)
     }
 
     /// From now on, a cache makes room after those that were named before: `shrink` frees about so many bytes. It must

@@ -8,7 +8,7 @@ use super::{Account, Memory, MemoryFull};
 
 /// A part of an account. It is kept beside the bytes that it accounts for.
 #[derive(Debug)]
-pub struct Share {
+pub struct MemoryShare {
     memory: Arc<Memory>,
     held: Mutex<Held>,
 }
@@ -19,7 +19,7 @@ struct Held {
     bytes: u64,
 }
 
-impl Share {
+impl MemoryShare {
     pub(super) fn new(memory: Arc<Memory>, account: Account) -> Self {
         Self { memory, held: Mutex::new(Held { account, bytes: 0 }) }
     }
@@ -38,8 +38,8 @@ impl Share {
         Ok(())
     }
 
-    /// As [`Share::grow`], without letting caches make room. The error is what the process lacks; None: the account has all
-    /// that it may have.
+    /// As [`MemoryShare::grow`], without letting caches make room. The error is what the process lacks;
+    /// None: the account has all that it may have.
     pub fn grow_now(&self, bytes: u64) -> Result<(), Option<u64>> {
         let account = self.lock().account;
         match self.memory.try_acquire(account, bytes) {
@@ -109,7 +109,7 @@ impl super::State {
     }
 }
 
-impl Drop for Share {
+impl Drop for MemoryShare {
     fn drop(&mut self) {
         let held = *self.held.get_mut().unwrap_or_else(PoisonError::into_inner);
         self.memory.lock().give(held.account, held.bytes);
@@ -121,7 +121,7 @@ impl Drop for Share {
 #[derive(Debug)]
 pub struct Counted {
     bytes: Bytes,
-    _share: Arc<Share>,
+    _share: Arc<MemoryShare>,
 }
 
 impl AsRef<[u8]> for Counted {
@@ -131,7 +131,7 @@ impl AsRef<[u8]> for Counted {
 }
 
 /// Bytes that exist already, counted as answers until something keeps them ([`Keeping`]).
-pub fn counted(memory: &Arc<Memory>, bytes: Bytes) -> (Bytes, Arc<Share>) {
+pub fn counted(memory: &Arc<Memory>, bytes: Bytes) -> (Bytes, Arc<MemoryShare>) {
     let share = Arc::new(memory.share(Account::Answers));
     share.take(bytes.len() as u64);
     (Bytes::from_owner(Counted { bytes, _share: share.clone() }), share)
@@ -139,11 +139,11 @@ pub fn counted(memory: &Arc<Memory>, bytes: Bytes) -> (Bytes, Arc<Share>) {
 
 /// A share that counts on the account of its keeper, and as an answer again once this is dropped.
 #[derive(Debug)]
-pub struct Keeping(Arc<Share>);
+pub struct Keeping(Arc<MemoryShare>);
 
 impl Keeping {
     /// Moves a share to the account of its keeper.
-    pub fn new(share: Arc<Share>, account: Account) -> Self {
+    pub fn new(share: Arc<MemoryShare>, account: Account) -> Self {
         share.move_to(account);
         Self(share)
     }

@@ -1,8 +1,7 @@
 use bytes::Bytes;
 
 use super::*;
-use meshsnap_render::limits::Lend as _;
-use meshsnap_render::limits::{Budget, Lender, Limits};
+use meshsnap_render::limits::{Budget, Lend, Limits};
 
 const UPLOADS: Account = Account::Uploads;
 
@@ -50,7 +49,7 @@ fn the_other_accounts_leave_jobs_their_part() {
 }
 
 /// A cache of shares of 100 bytes.
-fn cache(memory: &Arc<Memory>, account: Account, count: usize) -> Arc<Mutex<Vec<Share>>> {
+fn cache(memory: &Arc<Memory>, account: Account, count: usize) -> Arc<Mutex<Vec<MemoryShare>>> {
     let shares: Vec<_> = (0..count).map(|_| memory.share(account)).collect();
     shares.iter().for_each(|share| share.grow(100).unwrap());
     let cache = Arc::new(Mutex::new(shares));
@@ -104,8 +103,8 @@ fn a_job_grows_and_gives_everything_back() {
     let share = memory.share(Account::Jobs);
     share.grow(100).unwrap();
     let job = JobMemory::new(share, 500);
-    let limits = Limits { lender: Lender(Some(job.clone())), ..Limits::default() };
-    let mut budget = Budget::new(&limits);
+    let lender: Option<Arc<dyn Lend>> = Some(job.clone());
+    let mut budget = Budget::lent(&Limits::default(), lender.clone());
     budget.spend("a list", 300, 1).unwrap();
     assert_eq!(memory.used(Account::Jobs), 300);
     // A copy spends what the first one has left, not more of the share.
@@ -120,11 +119,11 @@ fn a_job_grows_and_gives_everything_back() {
     // What a cache counts from now on.
     job.restart();
     assert_eq!(memory.used(Account::Jobs), 600);
-    let mut after = budget.lent_by(&limits.lender, budget.spent_bytes());
+    let mut after = budget.lent_by(lender, budget.spent_bytes());
     after.spend("a list", 50, 1).unwrap();
     assert_eq!((memory.used(Account::Jobs), job.peak()), (650, 50));
     job.release();
-    drop((job, after, budget, limits, other));
+    drop((job, after, budget, other));
     assert_eq!(memory.used_in_all(), 0);
 }
 

@@ -36,7 +36,7 @@ pub struct Pictures {
 
 /// A picture and its origin.
 #[derive(Clone, Debug)]
-pub struct Found {
+pub struct FoundPicture {
     /// The picture.
     pub finished: Arc<Finished>,
     /// Its origin.
@@ -104,7 +104,11 @@ impl Pictures {
     /// The picture of this key, drawn by `draw` if it is not in memory. Requests for the same picture
     /// wait for the first. If that one fails or its client hangs up, each of the others draws for itself:
     /// none waits longer than for one drawing.
-    pub async fn find<E>(&self, key: &str, draw: impl Future<Output = Result<Arc<Finished>, E>>) -> Result<Found, E> {
+    pub async fn find<E>(
+        &self,
+        key: &str,
+        draw: impl Future<Output = Result<Arc<Finished>, E>>,
+    ) -> Result<FoundPicture, E> {
         let drawn = match self.join(key) {
             Joined::Kept(kept) => return Ok(kept.found(Source::Hit)),
             Joined::Second(mut first) => {
@@ -196,7 +200,7 @@ impl Kept {
         Self { finished, drawn: Instant::now(), memory: None }
     }
 
-    fn found(&self, source: Source) -> Found {
-        Found { finished: Arc::clone(&self.finished), source, age: self.drawn.elapsed() }
+    fn found(&self, source: Source) -> FoundPicture {
+        FoundPicture { finished: Arc::clone(&self.finished), source, age: self.drawn.elapsed() }
     }
 }

@@ -24,7 +24,7 @@ fn picture(bytes: usize) -> Arc<Finished> {
 }
 
 /// A request that draws for ever, or until it is aborted.
-fn endless(pictures: &Arc<Pictures>) -> tokio::task::JoinHandle<Result<Found, &'static str>> {
+fn endless(pictures: &Arc<Pictures>) -> tokio::task::JoinHandle<Result<FoundPicture, &'static str>> {
     let pictures = pictures.clone();
     tokio::spawn(async move { pictures.find("a", pending()).await })
 }

@@ -18,7 +18,7 @@ use crate::digest::Digest;
 use crate::durable::{Change, Durable, Hold};
 use crate::jobs::Owner;
 use crate::keys::Access;
-use crate::memory::{Account, Memory, MemoryFull, Share};
+use crate::memory::{Account, Memory, MemoryFull, MemoryShare};
 use meshsnap_render::import::{Bundle, Format};
 
 /// The way in which a bundle is read.
@@ -52,7 +52,7 @@ pub struct StoredMesh {
     pub mesh: NewMesh,
     /// The memory of its bytes. Every holder of the bytes holds a clone, and the memory counts
     /// until the last clone is dropped.
-    pub memory: Arc<Share>,
+    pub memory: Arc<MemoryShare>,
     /// Its files in the data folder, in the bundle's order, and its report. Empty without a data folder.
     pub holds: Arc<[Arc<Hold>]>,
 }

@@ -105,7 +105,7 @@ impl Least {
 
 /// The default limits, but for memory: the largest mesh has ten million triangles.
 fn limits() -> Limits {
-    Limits { memory_bytes: 16 << 30, ..Limits::default() }
+    Limits::default().with(|limits| limits.memory_bytes = 16 << 30)
 }
 
 /// A mesh.

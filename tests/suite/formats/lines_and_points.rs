@@ -56,7 +56,7 @@ fn obj_lines_and_points() {
     }
     // One line of text may be the whole file.
     let long = format!("{head}l{}\np{}", " 1 2".repeat(3_000_000), " 3".repeat(1_000_000));
-    for limits in [Limits::default(), Limits { memory_bytes: 32 << 20, ..Limits::default() }] {
+    for limits in [Limits::default(), Limits::default().with(|limits| limits.memory_bytes = 32 << 20)] {
         assert!(matches!(read_limited(long.as_bytes(), None, &limits).unwrap_err().fault, MeshFault::Limit(_)));
     }
     let good = format!("{head}usemtl A\nl 1 2 3\np 1 2\nf 1/1 2/1 3/1\nl 3/1 1/1\n");
@@ -86,7 +86,7 @@ fn ply_clouds_and_edges() {
     assert!(mesh.line_point_attributes.iter().all(|ends| ends.map(of) == [[1.0, 0.0, 0.0, 1.0]; 2]));
     assert_eq!(mesh.line_point_attributes.len(), 3);
     // Too many to draw, and told before they are.
-    let few = Limits { triangles: 11, ..Limits::default() };
+    let few = Limits::default().with(|limits| limits.triangles = 11);
     let cloud = Ply::new(ENCODINGS[1]).element("vertex", &XYZ, &points).bytes();
     assert!(read_limited(&cloud, None, &few).unwrap_err().detail.contains("--limit-triangles"));
     for name in ["ply_points_ascii.ply", "ply_points_bin.ply"] {

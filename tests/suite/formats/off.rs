@@ -176,7 +176,10 @@ fn broken_files_are_told_with_their_line() {
     let more = plain().replace("8 6 12", "8 7 12") + "2 1 1\n" + "left over\n";
     let mesh = read(more.as_bytes()).unwrap();
     assert_eq!(codes(&mesh), ["short_faces_ignored", "trailing_bytes"]);
-    for limits in [Limits { triangles: 11, ..Limits::default() }, Limits { memory_bytes: 100, ..Limits::default() }] {
+    for limits in [
+        Limits::default().with(|limits| limits.triangles = 11),
+        Limits::default().with(|limits| limits.memory_bytes = 100),
+    ] {
         for bytes in [plain().into_bytes(), binary(true)] {
             assert!(matches!(read_limited(&bytes, None, &limits).unwrap_err().fault, MeshFault::Limit(_)));
         }

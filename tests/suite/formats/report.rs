@@ -278,7 +278,7 @@ fn a_poor_budget_and_a_raised_flag_stop_the_report() {
         Report::of(&mesh, &mesh.report, 0, Extras::default(), &mut Budget::new(&Limits::default()), &stopped).is_err()
     );
     let needed = (0..10_000).find(|&memory_bytes| {
-        let limits = Limits { memory_bytes, ..Limits::default() };
+        let limits = Limits::default().with(|limits| limits.memory_bytes = memory_bytes);
         Report::of(&mesh, &mesh.report, 0, Extras::default(), &mut Budget::new(&limits), &Deadline::default()).is_ok()
     });
     assert!(needed.is_some_and(|bytes| bytes > 500), "{needed:?}");

@@ -107,6 +107,6 @@ fn files_cut_off_or_changed_are_survived() {
     assert!(drawn > 1000 && drawn < 19_900, "{drawn}");
     let drawn = mutate(triangles().stl_ascii().as_bytes(), Format::StlAscii, 20_000, 0x57_1002);
     assert!(drawn > 1000 && drawn < 19_900, "{drawn}");
-    let tight = Limits { memory_bytes: 600, ..Limits::default() };
+    let tight = Limits::default().with(|limits| limits.memory_bytes = 600);
     assert!(matches!(read_limited(&colored, None, &tight).unwrap_err().fault, MeshFault::Limit(_)));
 }

@@ -264,7 +264,10 @@ fn what_doubles_and_deepens_is_counted_first() {
     assert_eq!(cases.len(), 6);
     assert_eq!(read_model(&chain(65, 1, &cube)).unwrap().triangles.len(), 12);
     let bytes = package(cube_model(ITEM).as_bytes());
-    for limits in [Limits { triangles: 11, ..Limits::default() }, Limits { memory_bytes: 1000, ..Limits::default() }] {
+    for limits in [
+        Limits::default().with(|limits| limits.triangles = 11),
+        Limits::default().with(|limits| limits.memory_bytes = 1000),
+    ] {
         assert!(matches!(read_limited(&bytes, None, &limits).unwrap_err().fault, MeshFault::Limit(_)));
     }
     let (stopped, limits) = (Deadline::default(), Limits::default());
@@ -276,7 +279,7 @@ fn what_doubles_and_deepens_is_counted_first() {
     assert_eq!(read_model(&wide).unwrap().triangles.len(), 12);
     let bomb = cube_model(ITEM).replace("<vertices>", &format!("<vertices {}>", " ".repeat(2 << 20)));
     assert!(read_model(&bomb).unwrap_err().detail.contains("too long"));
-    let small = Limits { bundle_bytes: 1 << 20, ..Limits::default() };
+    let small = Limits::default().with(|limits| limits.bundle_bytes = 1 << 20);
     assert!(read_limited(&package(bomb.as_bytes()), None, &small).unwrap_err().detail.contains("--limit-bundle-bytes"));
 }
 

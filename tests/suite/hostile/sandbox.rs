@@ -129,7 +129,7 @@ fn the_process_reads_the_same_mesh() {
         ("ascii", ascii(&cube(vec![]))),
         ("meshoptimizer", Sheet::new().meshopt("KHR_meshopt_compression").glb()),
     ];
-    let spec = Spec::from_json(r#"{"size":32,"style":"wire"}"#).unwrap();
+    let spec = Spec::from_json(r#"{"size":32,"style":"wire"}"#);
     for (name, bytes) in files {
         // This binary has set up no process.
         let here = Renderer::cpu().render(&Mesh::read(&bytes).unwrap(), &spec).unwrap().to_png().unwrap();

@@ -15,7 +15,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("render/guard", &[]),
     ("render/pluralise", &[]),
     ("render/parallel", &[]),
-    ("server/percent", &[]),
     ("render/mesh", &["render/parallel", "render/limits", "render/warning"]),
     (
         "render/import",
@@ -111,7 +110,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "server/jobs",
             "server/residents",
             "server/pictures",
-            "server/percent",
             "server/config",
             "server/telemetry",
         ],

@@ -167,7 +167,7 @@ fn a_budget_refuses_in_the_same_words() {
     let mesh = scenes::mesh(&(scene.obj)());
     let spec = scenes::spec(&[("style", "outline"), ("outline.method", "contour"), ("size", "40")]);
     let build = |prepared: &Prepared, memory_bytes: u64| -> Result<u64, PlanError> {
-        let mut budget = Budget::new(&Limits { memory_bytes, ..Limits::default() });
+        let mut budget = Budget::new(&Limits::default().with(|limits| limits.memory_bytes = memory_bytes));
         let scene = Scene::new(&mesh, &spec, &mut budget)?;
         plan::build_from(&scene, prepared, &mut budget, &Deadline::default())?;
         Ok(budget.spent_bytes())
@@ -277,7 +277,7 @@ fn a_budget_refuses_textures_alike() {
     let mesh = model_with_two_images();
     let spec = scenes::spec(&[("style", "smooth"), ("size", "200")]);
     let build = |prepared: &Prepared, memory_bytes: u64| -> Result<u64, String> {
-        let mut budget = Budget::new(&Limits { memory_bytes, ..Limits::default() });
+        let mut budget = Budget::new(&Limits::default().with(|limits| limits.memory_bytes = memory_bytes));
         let scene = Scene::new(&mesh, &spec, &mut budget).map_err(|error| error.to_string())?;
         let plan = plan::build_from(&scene, prepared, &mut budget, &Deadline::default());
         plan.map_err(|error| error.to_string()).map(|_| budget.spent_bytes())

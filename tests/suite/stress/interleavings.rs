@@ -7,7 +7,7 @@ use std::time::Duration;
 use meshsnap_render::backend::HardwareHint;
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::import::Bundle;
-use meshsnap_render::limits::{Lender, Limits};
+use meshsnap_render::limits::Limits;
 use meshsnap_server::jobs::{CpuThreads, Job, JobSettings, JobState, Jobs, Owner, Task, Work, pipeline_renderers};
 use meshsnap_server::memory::{Account, Memory};
 use meshsnap_server::residents::Residents;
@@ -83,7 +83,7 @@ impl Process {
             mesh_key: Some(format!("mesh {mesh_number}")),
             task: Task::Draw(Box::new(spec)),
             memory: Arc::new(memory),
-            lender: Lender(None),
+            lender: None,
             recipe: None,
             owner: Owner::default(),
             request_id: "".into(),

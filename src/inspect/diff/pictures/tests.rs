@@ -51,7 +51,7 @@ fn other_sizes_and_what_is_no_picture_are_told() {
     assert_eq!(sniff(b"solid"), None);
     let broken = b"\x89PNG\r\n\x1a\n and so on";
     assert!(Picture::read(broken, sniff(broken).unwrap(), &Limits::default()).is_err());
-    let small = Limits { memory_bytes: 64, ..Limits::default() };
+    let small = Limits::default().with(|limits| limits.memory_bytes = 64);
     let mut png = Vec::new();
     image::RgbaImage::new(64, 64).write_to(&mut Cursor::new(&mut png), ImageFormat::Png).unwrap();
     assert!(Picture::read(&png, ImageFormat::Png, &small).is_err());

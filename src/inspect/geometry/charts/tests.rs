@@ -243,7 +243,7 @@ fn threads_change_nothing_and_too_much_is_told() {
     let (budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
     assert!(overlaps(&same, &budget, &deadline).unwrap().is_none());
     assert!(matches!(overlaps(&mesh, &budget, &Deadline::after_polls(9)), Err(Exhausted::Stopped(_))));
-    let small = Budget::new(&Limits { memory_bytes: 1000, ..Limits::default() });
+    let small = Budget::new(&Limits::default().with(|limits| limits.memory_bytes = 1000));
     assert!(matches!(overlaps(&mesh, &small, &deadline), Err(Exhausted::Limit(_))));
     assert!(matches!(Charts::of(&mesh, &small, &deadline), Err(Exhausted::Limit(_))));
 }

@@ -94,7 +94,7 @@ fn it_stops_and_it_is_refused() {
     for polls in [1, 3, 100, 500] {
         assert_eq!(stopped(polls), (true, true), "{polls}");
     }
-    let small = Budget::new(&Limits { memory_bytes: 1000, ..Limits::default() });
+    let small = Budget::new(&Limits::default().with(|limits| limits.memory_bytes = 1000));
     assert!(matches!(self_intersections(&pile, &small, &Deadline::default()), Err(Exhausted::Limit(_))));
     assert!(matches!(t_junctions(&pile, &small, &Deadline::default()), Err(Exhausted::Limit(_))));
     assert_eq!(found(&Mesh::default()), (vec![], Some(0)));

@@ -2,14 +2,19 @@
 
 use std::fmt::Write as _;
 
+use percent_encoding::{AsciiSet, utf8_percent_encode};
+
 use super::text::at;
 use super::{Findings, faults, is_invisible, word};
+use crate::check::SEGMENT;
 use meshsnap_inspect::check::{Check, Verdict};
 use meshsnap_render::pluralise::pluralise;
-use meshsnap_server::percent;
 
 /// Most bytes of the report: a comment on GitHub has at most 65,536 characters.
 const BYTES_MAX: usize = 60_000;
+
+/// Bytes that are escaped in the path of a picture.
+const PATH: &AsciiSet = &SEGMENT.remove(b'/');
 
 /// The width of a picture in the table, pixels.
 const THUMBNAIL_PX: u32 = 160;
@@ -97,7 +102,7 @@ fn thumbnails(findings: &Findings<'_>, text: &mut String) {
         let cells = verdict.pictures.iter().map(|(view, path)| {
             format!(
                 " <img src=\"{}\" width=\"{THUMBNAIL_PX}\" alt=\"{view} of {}\"> |",
-                percent::encoded(path, b"/"),
+                utf8_percent_encode(path, PATH),
                 prose(&verdict.path)
             )
         });

@@ -2,14 +2,15 @@
 
 use std::path::{Component, Path};
 
+use percent_encoding::utf8_percent_encode;
 use serde_json::{Value, json};
 
 use super::text::at;
 use super::{Findings, faults};
+use crate::check::SEGMENT;
 use crate::error::CliError;
 use meshsnap_inspect::check::{Check, Level, NAMES, PLACES_MAX, meaning};
 use meshsnap_server::digest::Digest;
-use meshsnap_server::percent;
 
 /// The report: a result for each broken rule of each file.
 pub fn sarif(findings: &Findings<'_>) -> Result<String, CliError> {
@@ -80,7 +81,7 @@ fn uri(path: &str) -> String {
         match component {
             Component::Prefix(_) | Component::Normal(_) => {
                 // A colon would end a scheme.
-                segments.push(percent::encoded(&component.as_os_str().to_string_lossy(), b""));
+                segments.push(utf8_percent_encode(&component.as_os_str().to_string_lossy(), SEGMENT).to_string());
             }
             Component::ParentDir => segments.push("..".to_owned()),
             Component::RootDir | Component::CurDir => {}

@@ -5,7 +5,9 @@
 
 use crate::import::bundle::{Bundle, BundleFile, FileUse, Origin, base_name, has_drive, show};
 use crate::import::{MeshError, MeshFault};
+use percent_encoding::percent_decode_str;
 use rapidhash::RapidHashMap;
+use std::borrow::Cow;
 use std::collections::hash_map::Entry;
 
 /// The unpacked files of a bundle, one of which is the mesh.
@@ -162,32 +164,11 @@ fn has_scheme(uri: &str) -> bool {
     })
 }
 
-/// Both readings of a URI: with percent escapes decoded, then unchanged, because many exporters do
-/// not escape.
+/// Both readings of a URI: with percent escapes decoded, if that is UTF-8, then unchanged, because many
+/// exporters do not escape.
 fn readings(uri: &str) -> impl Iterator<Item = String> {
-    let decoded = if uri.contains('%') { percent_decode(uri) } else { None };
-    decoded.into_iter().chain(std::iter::once(uri.to_owned()))
-}
-
-/// Decodes percent escapes. None if the result is not UTF-8.
-fn percent_decode(uri: &str) -> Option<String> {
-    let digit = |b: Option<&u8>| b.and_then(|&b| char::from(b).to_digit(16));
-    let bytes = uri.as_bytes();
-    let mut out = Vec::with_capacity(bytes.len());
-    let mut at = 0;
-    while let Some(&byte) = bytes.get(at) {
-        match (byte, digit(bytes.get(at + 1)), digit(bytes.get(at + 2))) {
-            (b'%', Some(high), Some(low)) => {
-                out.push((high * 16 + low) as u8);
-                at += 3;
-            }
-            _ => {
-                out.push(byte);
-                at += 1;
-            }
-        }
-    }
-    String::from_utf8(out).ok()
+    let decoded = uri.contains('%').then(|| percent_decode_str(uri).decode_utf8().ok()).flatten();
+    decoded.into_iter().map(Cow::into_owned).chain(std::iter::once(uri.to_owned()))
 }
 
 /// Joins `folder` and `path`, and resolves `.` and `..`.

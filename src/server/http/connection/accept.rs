@@ -23,7 +23,7 @@ use super::activity::{Activity, Client};
 use super::io::ClientStream;
 use super::places::{NoPlace, Places};
 use crate::http::dto::ProblemDto;
-use crate::http::error::{ApiError, Fault};
+use crate::http::error::{ApiError, ErrorKind};
 
 /// Time that clients have to read their answers once the last job has ended.
 const CLOSING_TIME: Duration = Duration::from_secs(5);
@@ -226,7 +226,7 @@ fn no_place(why: NoPlace) -> ApiError {
             ("as many connections are open from this address as may be; use them again", "--connections-per-address")
         }
     };
-    ApiError::new(Fault::Unavailable, "connections_full", detail).flag(flag)
+    ApiError::new(ErrorKind::Unavailable, "connections_full", detail).flag(flag)
 }
 
 /// Answers one connection too many with 503, without reading its request, and closes it.

@@ -23,7 +23,7 @@ pub struct Places {
 }
 
 /// A place, given back when it is dropped.
-pub struct Place {
+pub struct ConnectionPlace {
     _permit: OwnedSemaphorePermit,
     client: Option<(IpAddr, Arc<Counts>)>,
 }
@@ -50,7 +50,7 @@ impl Places {
     }
 
     /// A place for a client.
-    pub fn take(&self, address: IpAddr) -> Result<Place, NoPlace> {
+    pub fn take(&self, address: IpAddr) -> Result<ConnectionPlace, NoPlace> {
         let permit = self.all.clone().try_acquire_owned().map_err(|_| NoPlace::Full)?;
         let client = network(address);
         let mut counts = lock(&self.by_client);
@@ -60,17 +60,17 @@ impl Places {
         }
         *count += 1;
         drop(counts);
-        Ok(Place { _permit: permit, client: Some((client, self.by_client.clone())) })
+        Ok(ConnectionPlace { _permit: permit, client: Some((client, self.by_client.clone())) })
     }
 
     /// A place for a question about health. None if these are taken, too.
-    pub fn take_reserved(&self) -> Option<Place> {
+    pub fn take_reserved(&self) -> Option<ConnectionPlace> {
         let permit = self.reserved.clone().try_acquire_owned().ok()?;
-        Some(Place { _permit: permit, client: None })
+        Some(ConnectionPlace { _permit: permit, client: None })
     }
 }
 
-impl Drop for Place {
+impl Drop for ConnectionPlace {
     fn drop(&mut self) {
         let Some((client, counts)) = &self.client else { return };
         let mut counts = lock(counts);
@@ -107,12 +107,12 @@ mod tests {
     fn a_client_leaves_places_to_others() {
         let places = Places::new(8, 0);
         let (one, other) = (address("2001:db8::1"), address("10.0.0.1"));
-        let taken: Vec<Place> = (0..6).map(|_| places.take(one).ok().unwrap()).collect();
+        let taken: Vec<ConnectionPlace> = (0..6).map(|_| places.take(one).ok().unwrap()).collect();
         // Another address of its network.
         assert_eq!(places.take(address("2001:db8::ffff:2")).err(), Some(NoPlace::Client));
         let others = [places.take(other).ok().unwrap(), places.take(other).ok().unwrap()];
         assert_eq!(places.take(other).err(), Some(NoPlace::Full));
-        let reserved: Vec<Place> = std::iter::from_fn(|| places.take_reserved()).collect();
+        let reserved: Vec<ConnectionPlace> = std::iter::from_fn(|| places.take_reserved()).collect();
         assert_eq!(reserved.len(), RESERVED);
         drop((taken, others, reserved));
         assert!(lock(&places.by_client).is_empty());

@@ -144,7 +144,7 @@ impl LimitsDto {
     fn new(state: &AppState) -> Self {
         let (limits, (mesh_bytes, mesh_count)) = (&state.rules.limits, state.meshes.limits());
         Self {
-            body_bytes: limits.body_bytes,
+            body_bytes: state.body_bytes_max,
             memory_bytes: limits.memory_bytes,
             triangles: limits.triangles,
             nodes: limits.nodes,
@@ -154,8 +154,8 @@ impl LimitsDto {
             texture_total_px: limits.texture_total_px,
             bundle_bytes: limits.bundle_bytes,
             bundle_entries: limits.bundle_entries,
-            job_ms: limits.job_ms,
-            queue_per_worker: limits.queue_per_worker,
+            job_ms: state.job_ms_max,
+            queue_per_worker: state.queue_per_worker,
             mesh_bytes,
             mesh_count,
             resident_bytes: state.residents.limit_bytes(),

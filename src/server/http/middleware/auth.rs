@@ -10,7 +10,7 @@ use axum::middleware::Next;
 use axum::response::Response;
 
 use crate::http::connection::activity::Client;
-use crate::http::error::{ApiError, Fault};
+use crate::http::error::{ApiError, ErrorKind};
 use crate::http::state::AppState;
 use crate::jobs::Owner;
 use crate::keys::{Access, Key, KeySet, Scope};
@@ -31,7 +31,7 @@ pub async fn check(State(state): State<Arc<AppState>>, mut request: Request, nex
         (None, Some(key)) if key.may(Scope::Render) => key.access(),
         _ => {
             let detail = "this server wants an API key; send it as `Authorization: Bearer KEY`";
-            let error = ApiError::new(Fault::Unauthorized, "unauthorized", detail);
+            let error = ApiError::new(ErrorKind::Unauthorized, "unauthorized", detail);
             return Err(error.header(header::WWW_AUTHENTICATE, "Bearer"));
         }
     };
@@ -48,7 +48,7 @@ fn check_scope(key: &Key, request: &Request) -> Result<(), ApiError> {
     }
     let words: Vec<&str> = wanted.iter().map(|scope| scope.name()).collect();
     let detail = format!("this needs a key with the scope {}, and \"{}\" has it not", words.join(" or "), key.name);
-    Err(ApiError::new(Fault::Forbidden, "scope_missing", detail))
+    Err(ApiError::new(ErrorKind::Forbidden, "scope_missing", detail))
 }
 
 /// The scopes of which a request needs one, by the path of its route. None: every key will do.
@@ -74,7 +74,7 @@ fn unsign(request: &mut Request, keys: &KeySet, has_key: bool) -> Result<Option<
     let signer = match signed.check(keys.iter(), |key| &key.signs_with, unix_s()) {
         Ok(key) => Some(key.clone()),
         Err(_) if has_key || keys.is_empty() => None,
-        Err(bad) => return Err(ApiError::new(Fault::Forbidden, "bad_signature", bad.to_string())),
+        Err(bad) => return Err(ApiError::new(ErrorKind::Forbidden, "bad_signature", bad.to_string())),
     };
     if let Ok(plain) = signed.plain.parse() {
         *request.uri_mut() = plain;
@@ -92,7 +92,7 @@ fn by_address(request: &Request) -> Owner {
     client.map_or_else(Owner::default, |ConnectInfo(client)| Owner::new(&format!("address {}", client.address.ip())))
 }
 
-/// The token that a request carries.
+/// The token that a request carries. None if it carries two, of which the crate `headers` would take the first.
 fn bearer(headers: &HeaderMap) -> Option<&str> {
     let mut values = headers.get_all(header::AUTHORIZATION).iter();
     let value = values.next().and_then(|v| v.to_str().ok())?;

@@ -13,7 +13,7 @@ use axum::middleware::Next;
 use axum::response::Response;
 
 use super::cors;
-use crate::http::error::{ApiError, Fault};
+use crate::http::error::{ApiError, ErrorKind};
 use crate::http::state::AppState;
 
 /// Refuses what a page of another site makes a browser send.
@@ -28,13 +28,13 @@ pub async fn check(State(state): State<Arc<AppState>>, request: Request, next: N
                 "this server answers on this machine alone, and the request is for {shown:?}: ask for localhost, or \
                  give the server API keys"
             );
-            return Err(ApiError::new(Fault::Forbidden, "foreign_host", detail));
+            return Err(ApiError::new(ErrorKind::Forbidden, "foreign_host", detail));
         }
         let is_reading = [Method::GET, Method::HEAD, Method::OPTIONS].contains(request.method());
         if !is_reading && is_cross_site(request.headers(), &state.cors_origins) {
             let detail = "a page of another site sends this request; name its origin in --cors-origins, or give the server API \
                           keys, if it should";
-            return Err(ApiError::new(Fault::Forbidden, "cross_site", detail).flag("--cors-origins"));
+            return Err(ApiError::new(ErrorKind::Forbidden, "cross_site", detail).flag("--cors-origins"));
         }
     }
     Ok(next.run(request).await)

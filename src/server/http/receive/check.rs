@@ -37,7 +37,7 @@ pub enum Asked {
 /// Reads a request for a verdict. Every fault that shows without reading the mesh is found here.
 pub async fn receive(state: &AppState, request: Request, class: Class) -> Result<Asked, ApiError> {
     let (access, request_id) = (access_of(&request), observe::id_of(&request));
-    body::check_header(request.headers(), state.rules.limits.body_bytes)?;
+    body::check_header(request.headers(), state.body_bytes_max)?;
     let (reading, mut keys) = Keys::of_query(request.uri(), &KEYS)?;
     // Before the upload, so that a mistake costs none.
     task(&keys, Digest::of(b""))?;

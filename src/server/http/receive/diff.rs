@@ -19,7 +19,7 @@ use crate::http::state::AppState;
 use crate::http::{negotiate, stored_mesh};
 use crate::jobs::{Class, Comparing, Newer, Recipe, Task, Work};
 use crate::keys::Access;
-use crate::memory::Share;
+use crate::memory::MemoryShare;
 use crate::store::Reading;
 use meshsnap_inspect::diff;
 use meshsnap_render::image::ImageFormat;
@@ -58,7 +58,7 @@ struct Meshes {
 /// Reads a request for a difference. Every fault that shows without reading the meshes is found here.
 pub async fn receive(state: &AppState, request: Request, class: Class) -> Result<Asked, ApiError> {
     let (access, request_id) = (access_of(&request), observe::id_of(&request));
-    body::check_header(request.headers(), state.rules.limits.body_bytes)?;
+    body::check_header(request.headers(), state.body_bytes_max)?;
     let (reading, mut keys) = Keys::of_query(request.uri(), &KEYS)?;
     // Before the upload, so that a mistake costs none.
     Answer::of(state, &keys, form_of_answer(&keys, request.headers())?)?;
@@ -69,8 +69,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
         state.jobs.would_accept(class, &access.owner)?;
     }
     let headers = request.headers().clone();
-    let limits = &state.rules.limits;
-    let (bytes, files, time) = (limits.body_bytes, limits.bundle_entries, state.body_timeout);
+    let (bytes, files, time) = (state.body_bytes_max, state.rules.limits.bundle_entries, state.body_timeout);
     let (least_rate, memory) = (state.least_rate, &state.memory);
     let limits = BodyLimits { bytes, files, meshes: None, time, least_rate, memory };
     let meshes = match sides::read(request, limits).await? {
@@ -112,7 +111,7 @@ fn stored(
 }
 
 /// Two meshes that were sent.
-async fn sent(bundles: [Bundle; 2], memory: [Share; 2], reading: &Reading) -> Result<Meshes, ApiError> {
+async fn sent(bundles: [Bundle; 2], memory: [MemoryShare; 2], reading: &Reading) -> Result<Meshes, ApiError> {
     for bundle in &bundles {
         bundle.check_sent().map_err(|error| ApiError::from(&error))?;
     }

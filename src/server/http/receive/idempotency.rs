@@ -8,7 +8,7 @@ use super::body::{BodyKind, Upload};
 use super::query::Query;
 use crate::digest::Digest;
 use crate::http::dto::media_type;
-use crate::http::error::{ApiError, Fault};
+use crate::http::error::{ApiError, ErrorKind};
 use crate::http::negotiate;
 use crate::http::state::AppState;
 use crate::jobs::{Claim, ClaimName, Job, Media, Named, Owner};
@@ -29,7 +29,7 @@ pub enum Sent {
 
 /// The name that a client gives its request.
 pub fn name_of(headers: &HeaderMap, owner: &Owner) -> Result<Option<ClaimName>, ApiError> {
-    let bad = |detail: String| ApiError::new(Fault::BadRequest, "bad_idempotency_key", detail);
+    let bad = |detail: String| ApiError::new(ErrorKind::BadRequest, "bad_idempotency_key", detail);
     let mut values = headers.get_all(HEADER).iter();
     let Some(value) = values.next() else { return Ok(None) };
     if values.next().is_some() {
@@ -51,12 +51,12 @@ pub fn check(state: &AppState, name: &ClaimName, request: Digest) -> Result<Sent
         Named::Pending => {
             let detail =
                 "a request with this Idempotency-Key is being accepted at this moment; send this one again shortly";
-            Err(ApiError::new(Fault::Conflict, "idempotency_key_in_use", detail).retry_after(1))
+            Err(ApiError::new(ErrorKind::Conflict, "idempotency_key_in_use", detail).retry_after(1))
         }
         Named::Other => {
             let detail =
                 "this Idempotency-Key was sent with another request before; give each request a key of its own";
-            Err(ApiError::new(Fault::Content, "idempotency_key_reused", detail))
+            Err(ApiError::new(ErrorKind::Content, "idempotency_key_reused", detail))
         }
     }
 }

@@ -33,7 +33,6 @@ use crate::digest::Digest;
 use crate::jobs::{ClaimName, Class, Job, Owner, Recipe, Task, Work};
 use crate::keys::Access;
 use crate::store::Reading;
-use meshsnap_render::limits::Limits;
 use meshsnap_render::request;
 use meshsnap_render::spec::Spec;
 
@@ -76,7 +75,7 @@ pub struct Sender {
 /// before it takes a worker's time. A request for a job may have been accepted before.
 pub async fn receive(state: &AppState, request: Request, class: Class) -> Result<Reception, ApiError> {
     let (access, request_id) = (access_of(&request), observe::id_of(&request));
-    body::check_header(request.headers(), state.rules.limits.body_bytes)?;
+    body::check_header(request.headers(), state.body_bytes_max)?;
     let query = Query::read(request.uri(), &state.rules)?;
     let name = idempotency::name_of(request.headers(), &access.owner)?.filter(|_| class == Class::Batch);
     let webhook = webhook::of(state, request.headers(), class)?;
@@ -177,7 +176,7 @@ pub async fn read_upload(state: &AppState, request: Request) -> Result<Upload, A
 }
 
 async fn read_body(state: &AppState, request: Request, meshes: Option<u64>) -> Result<Upload, ApiError> {
-    let Limits { body_bytes: bytes, bundle_entries: files, .. } = state.rules.limits;
+    let (bytes, files) = (state.body_bytes_max, state.rules.limits.bundle_entries);
     let (time, least_rate, memory) = (state.body_timeout, state.least_rate, &state.memory);
     let limits = BodyLimits { bytes, files, meshes, time, least_rate, memory };
     body::read(request, limits).await

@@ -3,7 +3,7 @@
 use axum::extract;
 use axum::http::Uri;
 
-use crate::http::error::{ApiError, Fault};
+use crate::http::error::{ApiError, ErrorKind};
 use crate::store::Reading;
 use meshsnap_render::import::Format;
 use meshsnap_render::request::{self, Overrides, RequestError, RequestFault, Rules};
@@ -81,7 +81,7 @@ fn take(pairs: &mut Vec<(String, String)>, key: &str) -> Result<Option<String>, 
 
 /// The error of a request that is malformed.
 pub fn bad(code: &'static str, detail: String) -> ApiError {
-    ApiError::new(Fault::BadRequest, code, detail)
+    ApiError::new(ErrorKind::BadRequest, code, detail)
 }
 
 /// The beginning of a client's text, in quotes.

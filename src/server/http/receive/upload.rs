@@ -7,8 +7,8 @@ use axum::body::Bytes;
 
 use super::body::{self, BodyKind, Upload};
 use crate::digest::Digest;
-use crate::http::error::{ApiError, Fault};
-use crate::memory::Share;
+use crate::http::error::{ApiError, ErrorKind};
+use crate::memory::MemoryShare;
 use meshsnap_render::import::Bundle;
 
 /// An upload and its name.
@@ -18,7 +18,7 @@ pub struct NamedUpload {
     /// The files to store.
     pub bundle: Bundle,
     /// The memory of the upload.
-    pub memory: Arc<Share>,
+    pub memory: Arc<MemoryShare>,
 }
 
 /// Names an upload: a file or an archive by its bytes, a form by the list of its files.
@@ -32,7 +32,7 @@ pub async fn name(upload: Upload) -> Result<NamedUpload, ApiError> {
     let is_zip = || bundle.files().first().is_some_and(|file| Bundle::of_one(file.bytes.clone()).is_zip());
     if kind == BodyKind::Archive && !is_zip() {
         let detail = "the body is said to be a zip archive and does not begin as one";
-        return Err(ApiError::new(Fault::Content, "bundle_broken", detail));
+        return Err(ApiError::new(ErrorKind::Content, "bundle_broken", detail));
     }
     // Hashing a large body would block other requests. The reservation moves along, so that the
     // memory counts until the bytes are dropped, even if the client hangs up.

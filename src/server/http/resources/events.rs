@@ -18,7 +18,7 @@ use super::{PathName, jobs};
 use crate::http::connection::activity::{Busy, Client};
 use crate::http::dto::JobDto;
 use crate::http::error::ApiError;
-use crate::http::event_streams::Place;
+use crate::http::event_streams::OpenStream;
 use crate::http::state::AppState;
 use crate::jobs::{Job, JobState, Progress, Step};
 use crate::keys::Access;
@@ -47,7 +47,7 @@ struct Following {
     progress: watch::Receiver<Progress>,
     seen: Seen,
     ready: VecDeque<Event>,
-    place: Place,
+    stream: OpenStream,
     /// The connection is in use, however silent it is.
     _busy: Option<Busy>,
 }
@@ -66,10 +66,10 @@ pub async fn get(
     if seen == Seen::End && job.state().is_final() {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
-    let place = state.event_streams.open(&access.owner)?;
+    let stream = state.event_streams.open(&access.owner)?;
     let (states, progress) = job.watch();
     let busy = client.map(|Extension(ConnectInfo(client))| client.activity.begin());
-    let following = Following { state, job, states, progress, seen, ready: VecDeque::new(), place, _busy: busy };
+    let following = Following { state, job, states, progress, seen, ready: VecDeque::new(), stream, _busy: busy };
     let events = stream::unfold(following, |mut following| async {
         let event = following.next().await?;
         Some((Ok::<_, Infallible>(event), following))
@@ -102,7 +102,7 @@ impl Following {
             tokio::select! {
                 changed = self.states.changed() => changed.ok()?,
                 changed = self.progress.changed() => changed.ok()?,
-                () = self.place.closing() => return None,
+                () = self.stream.closing() => return None,
             }
         }
     }

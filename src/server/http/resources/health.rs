@@ -9,7 +9,7 @@ use axum::response::Response;
 use super::{responses, schema};
 use crate::durable::Durable;
 use crate::http::dto::{CapabilitiesDto, DifficultyDto, StatusDto, VersionDto};
-use crate::http::error::{ApiError, Fault};
+use crate::http::error::{ApiError, ErrorKind};
 use crate::http::state::AppState;
 
 /// 200 while the process is alive.
@@ -26,7 +26,7 @@ pub async fn readyz(State(state): State<Arc<AppState>>) -> Result<Response, ApiE
     let detail = format!("{} workers do not end jobs whose time is up", load.overdue);
     if load.missing as u64 >= state.workers {
         let detail = format!("{detail}, and none is left; start the server anew");
-        return Err(ApiError::new(Fault::Unavailable, "workers_overdue", detail));
+        return Err(ApiError::new(ErrorKind::Unavailable, "workers_overdue", detail));
     }
     let overdue = (load.overdue > 0).then_some(DifficultyDto { code: "workers_overdue", detail });
     let trouble = state.durable.as_ref().and_then(Durable::trouble).map(ApiError::from);

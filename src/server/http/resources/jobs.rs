@@ -10,7 +10,7 @@ use axum::response::{IntoResponse as _, Response};
 use super::verdicts::{check, diff};
 use super::{PathName, responses, run, text_of};
 use crate::http::dto::{JobOfMeshDto, JobsDto};
-use crate::http::error::{ApiError, Fault};
+use crate::http::error::{ApiError, ErrorKind};
 use crate::http::negotiate;
 use crate::http::receive::meshes::MeshOfForm;
 use crate::http::receive::{self, Reception};
@@ -51,7 +51,7 @@ fn take_kind(request: &mut Request) -> Result<Kind, ApiError> {
         ["kind=diff"] => Kind::Diff,
         _ => {
             let detail = "`kind` is given once, and allowed is one of render, check, diff";
-            return Err(ApiError::new(Fault::BadRequest, "out_of_range", detail));
+            return Err(ApiError::new(ErrorKind::BadRequest, "out_of_range", detail));
         }
     };
     let address = format!("{}?{}", request.uri().path(), others.join("&"));
@@ -126,7 +126,7 @@ pub async fn result(
     id: PathName,
 ) -> Result<Response, ApiError> {
     let job = find(&state, &access, id)?;
-    let conflict = |code, detail| ApiError::new(Fault::Conflict, code, detail);
+    let conflict = |code, detail| ApiError::new(ErrorKind::Conflict, code, detail);
     let ended = job.state();
     if ended.is_final() {
         state.jobs.fetched(&job);

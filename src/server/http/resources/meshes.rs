@@ -16,7 +16,7 @@ use crate::digest::Digest;
 use crate::durable::{Change, FileRecord, MeshRecord};
 use crate::http::conditional;
 use crate::http::dto::MeshDto;
-use crate::http::error::{ApiError, Fault};
+use crate::http::error::{ApiError, ErrorKind};
 use crate::http::receive::query::Query;
 use crate::http::receive::upload::{self, NamedUpload};
 use crate::http::receive::{self, body};
@@ -85,7 +85,7 @@ pub async fn delete(
 async fn store(state: &AppState, request: Request, wanted: Option<Digest>) -> Result<Response, ApiError> {
     let reading = Query::read_for_upload(request.uri(), &state.rules)?;
     let headers = request.headers();
-    body::check_header(headers, state.rules.limits.body_bytes)?;
+    body::check_header(headers, state.body_bytes_max)?;
     // A form's length is not the mesh's, because the form has boundaries and headers as well.
     if let Some(length) = body::announced_length(headers).filter(|_| !body::is_multipart(headers)) {
         state.meshes.check_size(length)?;
@@ -95,7 +95,7 @@ async fn store(state: &AppState, request: Request, wanted: Option<Digest>) -> Re
     let NamedUpload { digest, bundle, memory } = upload::name(receive::read_upload(state, request).await?).await?;
     if let Some(wanted) = wanted.filter(|wanted| *wanted != digest) {
         let detail = format!("the path says {wanted}, and the SHA-256 of what was sent is {digest}");
-        return Err(ApiError::new(Fault::Content, "digest_mismatch", detail));
+        return Err(ApiError::new(ErrorKind::Content, "digest_mismatch", detail));
     }
     state.meshes.check_size(bundle.bytes_len())?;
     let body = MeshDto::new(digest, &bundle);

@@ -11,7 +11,7 @@ use crate::http::conditional;
 use crate::http::dto::{JobDto, media_type};
 use crate::http::error::IsAnswer;
 use crate::jobs::{Finished, Job, Media, Timings};
-use crate::pictures::{Found, Source};
+use crate::pictures::{FoundPicture, Source};
 
 /// A picture, with its back-end, timings and warnings as headers, or a verdict.
 pub fn result(finished: &Finished) -> Response {
@@ -77,7 +77,7 @@ fn picture_with_tag(finished: &Finished, tag: &str) -> Response {
 
 /// As [`result`], and whether it was in memory. A picture that this request has not drawn brings its
 /// age instead of timings. Its tag is `tag`, if it has an address; the bytes are then not hashed.
-pub fn found(found: &Found, tag: Option<&str>) -> Response {
+pub fn found(found: &FoundPicture, tag: Option<&str>) -> Response {
     let mut response = match tag {
         Some(tag) => with_tag(&found.finished, tag),
         None => result(&found.finished),

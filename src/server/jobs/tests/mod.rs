@@ -14,7 +14,7 @@ use crate::memory::Account;
 use meshsnap_render::backend::{BackendKind, DrawTimes};
 use meshsnap_render::image::ImageFormat;
 use meshsnap_render::import::Bundle;
-use meshsnap_render::limits::{Deadline, Lender, Stopped};
+use meshsnap_render::limits::{Deadline, Stopped};
 use meshsnap_render::pipeline::{DrawReport, Output, RenderError, Stage};
 use meshsnap_render::spec::color::Rgba;
 use meshsnap_render::spec::{
@@ -54,7 +54,7 @@ fn work(budget: &Arc<Memory>, mesh: &'static [u8]) -> Work {
         mesh_key: None,
         task,
         memory: Arc::new(reservation),
-        lender: Lender(None),
+        lender: None,
         recipe: None,
         owner: Owner::default(),
         request_id: "".into(),

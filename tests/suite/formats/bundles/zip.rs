@@ -106,13 +106,13 @@ fn bombs_break_a_limit_before_they_go_off() {
     assert!(bomb.packed.len() * 1000 < zeros.len(), "{}", bomb.packed.len());
     let nine = (0..9).map(|i| Raw { name: format!("{i}.bin").into(), ..bomb.clone() }).collect::<Vec<_>>();
     let many: Vec<Raw> = (0..65_535).map(|i| Raw::stored(&format!("{i}"), b"")).collect();
-    let small = Limits { memory_bytes: 1 << 20, ..Limits::default() };
+    let small = Limits::default().with(|limits| limits.memory_bytes = 1 << 20);
     let cases: [(&str, Vec<u8>, &Limits, &str); 5] = [
         ("too large together", archive(&nine, 9), &Limits::default(), "--limit-bundle-bytes"),
         (
             "too large",
             archive(std::slice::from_ref(&bomb), 1),
-            &Limits { bundle_bytes: 1000, ..Limits::default() },
+            &Limits::default().with(|limits| limits.bundle_bytes = 1000),
             "--limit-bundle-bytes",
         ),
         ("too large for the job", archive(std::slice::from_ref(&bomb), 1), &small, "--limit-memory-bytes"),
@@ -196,7 +196,7 @@ fn damaged_archives_never_panic() {
     let honest =
         archive(&[Raw::stored("m.obj", obj), Raw::deflated("m.mtl", mtl), Raw::stored("a.png", b"\x89PNG")], 3);
     assert!(read_bundle(&Bundle::of_one(honest.clone())).is_ok());
-    let limits = Limits { memory_bytes: 64 << 20, ..Limits::default() };
+    let limits = Limits::default().with(|limits| limits.memory_bytes = 64 << 20);
     let mut noise = Noise(7);
     let mut random = |below: usize| (noise.next() >> 33) as usize % below;
     let (mut read, mut refused) = (0, 0);

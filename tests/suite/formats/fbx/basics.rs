@@ -88,9 +88,9 @@ fn nodes_below_nodes_show_a_mesh_as_often_as_they_say() {
         assert_eq!(codes(&mesh), ["hidden_ignored"]);
         let size = [0, 1].map(|k| f64::from(mesh.bounds[1][k] - mesh.bounds[0][k]) * mesh.to_file.scale);
         assert_eq!(size, [22.0, 24.0], "{name}");
-        let few = Limits { triangles: 23, ..Limits::default() };
+        let few = Limits::default().with(|limits| limits.triangles = 23);
         assert!(matches!(read_limited(&bytes, None, &few).unwrap_err().fault, MeshFault::Limit(_)));
-        let few = Limits { nodes: 3, ..Limits::default() };
+        let few = Limits::default().with(|limits| limits.nodes = 3);
         assert!(read_limited(&bytes, None, &few).unwrap_err().detail.contains("--limit-nodes"));
     }
 }
@@ -244,7 +244,7 @@ fn what_is_hostile_is_refused() {
     assert!(error.fault == MeshFault::Broken && error.detail.contains("1024 deep"), "{error}");
     for write in [ascii, binary] {
         let good = write(&cube(vec![]));
-        let small = Limits { memory_bytes: 20_000, ..Limits::default() };
+        let small = Limits::default().with(|limits| limits.memory_bytes = 20_000);
         let error = read_limited(&good, None, &small).unwrap_err();
         assert!(error.detail.contains("--limit-memory-bytes"), "{error}");
         let (stopped, limits) = (Deadline::default(), Limits::default());

@@ -23,7 +23,7 @@ fn memory_and_triangles_are_limited() {
     let many = bytes(property, &list(corners));
     let one = format!("{property}property list uint uchar texcoord\n");
     let with_uvs = bytes(&one, &[list(9_000_000), list(18_000_000)].concat());
-    let small = Limits { memory_bytes: 64 << 20, ..Limits::default() };
+    let small = Limits::default().with(|limits| limits.memory_bytes = 64 << 20);
     for (file, limits) in [(&many, &Limits::default()), (&many, &small), (&with_uvs, &small)] {
         // The importer holds its bytes once; what a limit refuses is not allocated.
         let most = limits.memory_bytes.min(1 << 30) + 2 * file.len() as u64;

@@ -192,6 +192,7 @@ fn totals(files: &[(String, Vec<u8>)], is_said_gltf: bool, is_drawn: bool) -> Op
             format,
             Extras::default(),
             &limits,
+            &mut Budget::new(&limits),
             &Deadline::default(),
             &mut |_| {},
         )

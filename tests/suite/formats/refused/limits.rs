@@ -85,10 +85,12 @@ fn triangles_and_memory_are_limited_in_every_format() {
         solid.ply(Encoding::Big),
     ];
     for bytes in &files {
-        let exact = Limits { triangles: 3, ..Limits::default() };
+        let exact = Limits::default().with(|limits| limits.triangles = 3);
         assert!(read_limited(bytes, None, &exact).is_ok());
-        for limits in [Limits { triangles: 2, ..Limits::default() }, Limits { memory_bytes: 100, ..Limits::default() }]
-        {
+        for limits in [
+            Limits::default().with(|limits| limits.triangles = 2),
+            Limits::default().with(|limits| limits.memory_bytes = 100),
+        ] {
             let error = read_limited(bytes, None, &limits).unwrap_err();
             assert!(matches!(error.fault, MeshFault::Limit(_)), "{error}");
         }
@@ -115,7 +117,8 @@ fn obj_text_that_explodes_is_refused() {
     }
     // Materials that change with every face cost no more than other lines.
     let changes = format!("{head}{}", "usemtl a\nf 1 2 3\nusemtl b\n".repeat(200_000));
-    let mesh = read_limited(changes.as_bytes(), None, &Limits { memory_bytes: 64 << 20, ..Limits::default() }).unwrap();
+    let mesh = read_limited(changes.as_bytes(), None, &Limits::default().with(|limits| limits.memory_bytes = 64 << 20))
+        .unwrap();
     assert_eq!(mesh.triangles.len(), 200_000);
     assert_eq!(mesh.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), ["a", "b"]);
 }
@@ -123,7 +126,7 @@ fn obj_text_that_explodes_is_refused() {
 #[test]
 fn names_of_libraries_take_the_memory_that_was_paid_for() {
     let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-    let limits = Limits { memory_bytes: 64 << 20, ..Limits::default() };
+    let limits = Limits::default().with(|limits| limits.memory_bytes = 64 << 20);
     let distinct: String = (0..400_000).map(|i| format!("mtllib {i}\n")).collect();
     let cases = [(distinct, false), ("mtllib a\n".repeat(1_000_000), true), ("mtllib\n".repeat(2_000_000), true)];
     for (lines, is_read) in cases {

@@ -113,7 +113,7 @@ fn odd_meshes_and_small_budgets_are_no_panic() {
     let spec = scenes::spec(&[SHADOW, ("size", "16"), ("style", "flat")]);
     let mut refused = 0;
     for kib in 1..2000 {
-        let limits = Limits { memory_bytes: kib << 10, ..Limits::default() };
+        let limits = Limits::default().with(|limits| limits.memory_bytes = kib << 10);
         if let Err(error) = scenes::try_plan(&mesh, &spec, &limits, &Deadline::default(), &[]) {
             refused += usize::from(error.to_string().contains("ground"));
         }

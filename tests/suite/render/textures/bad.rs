@@ -101,7 +101,10 @@ fn sizes_are_checked_before_anything_is_decoded() {
         let PlanError::Limit(limit) = error(&wide) else { panic!("{width}x{height}: {}", error(&wide)) };
         assert_eq!((limit.flag, limit.given), ("--limit-texture-px", u64::from(width.max(height))));
         // Where such a texture is allowed, it is its memory that is not.
-        let vast = Limits { texture_px: u64::MAX, texture_total_px: u64::MAX, ..Limits::default() };
+        let vast = Limits::default().with(|limits| {
+            limits.texture_px = u64::MAX;
+            limits.texture_total_px = u64::MAX;
+        });
         assert!(
             matches!(plan_of(&wide, &[], &vast), Err(PlanError::Limit(limit)) if limit.flag == "--limit-memory-bytes")
         );
@@ -118,15 +121,21 @@ fn sizes_are_checked_before_anything_is_decoded() {
         })
     };
     let usual = Limits::default();
-    assert_eq!(flag(Limits { texture_px: 100, texture_total_px: 5000, ..usual.clone() }), Ok(()));
-    assert_eq!(flag(Limits { texture_px: 99, ..usual.clone() }), Err("--limit-texture-px"));
-    assert_eq!(flag(Limits { texture_total_px: 4999, ..usual.clone() }), Err("--limit-texture-total-px"));
-    assert_eq!(flag(Limits { memory_bytes: 100_000, ..usual }), Err("--limit-memory-bytes"));
+    assert_eq!(
+        flag(usual.clone().with(|limits| {
+            limits.texture_px = 100;
+            limits.texture_total_px = 5000;
+        })),
+        Ok(())
+    );
+    assert_eq!(flag(usual.clone().with(|limits| limits.texture_px = 99)), Err("--limit-texture-px"));
+    assert_eq!(flag(usual.clone().with(|limits| limits.texture_total_px = 4999)), Err("--limit-texture-total-px"));
+    assert_eq!(flag(usual.with(|limits| limits.memory_bytes = 100_000)), Err("--limit-memory-bytes"));
 
     // Within the limits, and not paid for.
     let large = png(&[(b"IHDR", &header(8000, 8000, 16, 6)), (b"IDAT", &zlib(&[0; 900]))]);
     let mesh = model_of(&large);
-    let small = Limits { memory_bytes: 256 << 20, ..Limits::default() };
+    let small = Limits::default().with(|limits| limits.memory_bytes = 256 << 20);
     let planned = within_bytes(UNDECODED_MAX, "a large picture", || plan_of(&mesh, &[], &small).map(drop));
     assert!(matches!(planned, Err(PlanError::Limit(_))));
 }
@@ -155,7 +164,7 @@ fn chunks_beside_the_pixels_cost_nothing() {
         let picture = png(&[(b"IHDR", &header), (kind, data), (b"IDAT", &row)]);
         let mesh = model_of(&picture);
         // Far too little for what they hold.
-        let limits = Limits { memory_bytes: 16 << 20, ..Limits::default() };
+        let limits = Limits::default().with(|limits| limits.memory_bytes = 16 << 20);
         let plan = plan_of(&mesh, &[SkipKind::FineTextureLevels], &limits).unwrap();
         assert_eq!(plan.surface.unwrap().textures.images[0].texels[..], want.images[0].texels[..]);
         cases += 1;

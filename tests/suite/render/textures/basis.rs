@@ -85,7 +85,7 @@ fn other_ktx2_files_are_named() {
         put(&mut bytes, 20, side);
         put(&mut bytes, 24, side);
         let mesh = model_of(&bytes);
-        let limits = Limits { texture_total_px: 8192 * 8191, ..Limits::default() };
+        let limits = Limits::default().with(|limits| limits.texture_total_px = 8192 * 8191);
         let spec = crate::support::scenes::spec(&[("style", "smooth"), ("size", "64")]);
         let error = crate::support::scenes::try_plan(&mesh, &spec, &limits, &Deadline::default(), &[]).unwrap_err();
         assert!(matches!(&error, PlanError::Limit(over) if over.flag == limit), "{error}");

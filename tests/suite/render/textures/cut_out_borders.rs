@@ -111,7 +111,7 @@ fn bad_images_and_small_budgets_are_no_panic() {
     let spec = scenes::spec(&[("style", "outline")]);
     let mut refused = 0;
     for kib in 0..64 {
-        let mut budget = Budget::new(&Limits { memory_bytes: kib << 10, ..Limits::default() });
+        let mut budget = Budget::new(&Limits::default().with(|limits| limits.memory_bytes = kib << 10));
         let framing = plan::framing(&mesh, &spec, &Prepared::default(), &mut budget, &Deadline::default());
         refused += usize::from(framing.is_err_and(|error| error.to_string().contains("cut-out")));
     }

@@ -292,7 +292,8 @@ fn a_small_budget_decodes_one_after_the_other() {
     let least = |material: &Value| {
         let mesh = model(&[TRIANGLE], &[UVS], &picture, material.clone());
         let keep = [SkipKind::FineTextureLevels];
-        let plan = |memory_bytes| plan_of(&mesh, &keep, &Limits { memory_bytes, ..Limits::default() });
+        let plan =
+            |memory_bytes| plan_of(&mesh, &keep, &Limits::default().with(|limits| limits.memory_bytes = memory_bytes));
         let (mut low, mut high) = (0, 1 << 30);
         while low + 1 < high {
             let middle = (low + high) / 2;

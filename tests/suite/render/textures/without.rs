@@ -154,7 +154,7 @@ fn damaged_files_of_every_format_are_drawn_without() {
             }
             let spec = scenes::spec(&[("style", "smooth"), ("size", "16")]);
             // Sizes beyond the limits are refused.
-            let limits = Limits { texture_px: 256, ..Limits::default() };
+            let limits = Limits::default().with(|limits| limits.texture_px = 256);
             let mesh = model_of(&bytes);
             if let Ok(plan) = scenes::try_plan(&mesh, &spec, &limits, &Deadline::default(), &[]) {
                 outcomes[usize::from(plan.warnings.is_empty())] += 1;

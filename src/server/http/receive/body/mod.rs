@@ -10,9 +10,9 @@ use axum::extract::{FromRequest as _, Multipart, Request};
 use axum::http::{HeaderMap, header};
 use futures_util::{Stream, StreamExt as _, stream};
 
-use crate::http::error::{ApiError, Fault};
+use crate::http::error::{ApiError, ErrorKind};
 use crate::jobs::Refusal;
-use crate::memory::{Account, Memory, Share};
+use crate::memory::{Account, Memory, MemoryShare};
 use meshsnap_render::import::{Bundle, BundleFile};
 use meshsnap_render::limits;
 
@@ -36,7 +36,7 @@ pub struct Upload {
     /// The request document, if the body is a multipart form that has one.
     pub document: Option<Bytes>,
     /// The memory that bundle and document take.
-    pub reservation: Share,
+    pub reservation: MemoryShare,
 }
 
 /// Kinds of bodies, by `Content-Type`.
@@ -76,7 +76,7 @@ pub fn check_header(headers: &HeaderMap, bytes_max: u64) -> Result<(), ApiError>
     }
     if headers.get(header::CONTENT_ENCODING).is_some_and(|v| !v.as_bytes().eq_ignore_ascii_case(b"identity")) {
         let detail = "a Content-Encoding is not understood; send the body as it is";
-        return Err(ApiError::new(Fault::UnknownFormat, "content_encoding", detail));
+        return Err(ApiError::new(ErrorKind::UnknownFormat, "content_encoding", detail));
     }
     Ok(())
 }
@@ -98,7 +98,7 @@ pub fn is_multipart(headers: &HeaderMap) -> bool {
 
 /// The error for a malformed form, or one with missing or unexpected parts.
 pub fn bad_form(detail: impl Into<String>) -> ApiError {
-    ApiError::new(Fault::BadRequest, "bad_form", detail)
+    ApiError::new(ErrorKind::BadRequest, "bad_form", detail)
 }
 
 /// Reads the body: a mesh file, a zip archive, or a form with files.
@@ -242,7 +242,7 @@ struct MeterState {
     bytes: u64,
     /// Bytes since the last part of a form, while the parser searches the next one.
     bytes_between_parts: Option<u64>,
-    reservation: Share,
+    reservation: MemoryShare,
     error: Option<ApiError>,
 }
 
@@ -296,12 +296,12 @@ impl Meter {
     fn error(&self, _: Interrupted) -> ApiError {
         self.error_or(|| {
             let detail = "the request body ended before its announced end";
-            ApiError::new(Fault::BadRequest, "body_incomplete", detail)
+            ApiError::new(ErrorKind::BadRequest, "body_incomplete", detail)
         })
     }
 
     /// Hands over the memory that was reserved so far.
-    fn take_reservation(&self) -> Share {
+    fn take_reservation(&self) -> MemoryShare {
         std::mem::replace(&mut self.lock().reservation, self.memory.share(Account::Uploads))
     }
 
@@ -368,13 +368,13 @@ impl Pace {
 /// The error of a client that sends a few bytes now and then.
 fn below_rate(least_rate: u64) -> ApiError {
     let detail = format!("the request body arrived with fewer than {least_rate} bytes a second");
-    ApiError::new(Fault::TooSlow, "body_timeout", detail).flag("--least-rate-bytes")
+    ApiError::new(ErrorKind::TooSlow, "body_timeout", detail).flag("--least-rate-bytes")
 }
 
 /// The error of a client that holds memory, sends nothing or hardly anything, and is in others' way.
 fn stalled() -> ApiError {
     let detail = "the request body stopped arriving while other uploads waited for the memory that it holds";
-    ApiError::new(Fault::TooSlow, "body_timeout", detail).flag("--uploads-bytes")
+    ApiError::new(ErrorKind::TooSlow, "body_timeout", detail).flag("--uploads-bytes")
 }
 
 fn has_media_type(headers: &HeaderMap, wanted: &str) -> bool {
@@ -384,5 +384,5 @@ fn has_media_type(headers: &HeaderMap, wanted: &str) -> bool {
 
 fn too_slow(limit: Duration) -> ApiError {
     let detail = format!("the request body did not arrive within {} ms", limit.as_millis());
-    ApiError::new(Fault::TooSlow, "body_timeout", detail).flag("--body-timeout-ms")
+    ApiError::new(ErrorKind::TooSlow, "body_timeout", detail).flag("--body-timeout-ms")
 }

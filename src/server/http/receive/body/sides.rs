@@ -5,7 +5,7 @@ use axum::extract::{FromRequest as _, Multipart, Request};
 
 use super::{BodyLimits, Meter, bad_form, empty_file, is_multipart, metered, read_whole, too_slow};
 use crate::http::error::ApiError;
-use crate::memory::Share;
+use crate::memory::MemoryShare;
 use meshsnap_render::import::{Bundle, BundleFile};
 use meshsnap_render::limits;
 
@@ -20,7 +20,7 @@ pub enum Sides {
         /// The meshes.
         bundles: [Bundle; 2],
         /// The memory of each.
-        reservations: [Share; 2],
+        reservations: [MemoryShare; 2],
     },
     /// A document.
     Document(Bytes),
