@@ -1,6 +1,6 @@
 //! Draws a mesh file into a PNG file.
 //!
-//!     cargo run --release --example thumbnail -- api/examples/knot.obj knot.png
+//!     cargo run --release -p meshsnap --example thumbnail -- api/examples/knot.obj knot.png
 
 use std::error::Error;
 

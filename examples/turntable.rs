@@ -1,6 +1,6 @@
 //! Draws one mesh from many sides: it is read once.
 //!
-//!     cargo run --release --example turntable -- api/examples/knot.obj 12 frames/
+//!     cargo run --release -p meshsnap --example turntable -- api/examples/knot.obj 12 frames/
 
 use std::error::Error;
 use std::path::Path;
