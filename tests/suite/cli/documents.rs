@@ -1,5 +1,6 @@
-//! Types the commands of README.md and of documents in docs/ as they stand there, and looks at what each prints and writes.
-//! Only the server's address and the words SHA256 and ID, which stand for what an earlier answer has given, are replaced.
+//! Types the commands of README.md and of documents in docs/ as they stand there, and looks at what each prints and
+//! writes. Only the server's address and the words SHA256 and ID, which stand for what an earlier answer has given, are
+//! replaced.
 
 use std::path::Path;
 use std::process::{Command, Output, Stdio};

@@ -20,8 +20,8 @@ fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Every document, by its path from the root. CHANGELOG.md tells of files that are gone, and `tests/data` has documents of
-/// others.
+/// Every document, by its path from the root. Left out are CHANGELOG.md, which tells of files that are gone, and
+/// `tests/data`, whose documents came with the meshes.
 fn documents() -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(root()).unwrap() {
@@ -52,8 +52,8 @@ fn linked_files(text: &str) -> Vec<&str> {
     files.map(|target| target.split('#').next().unwrap_or_default()).collect()
 }
 
-/// True if the path names something that exists: a file or folder, the folder before a placeholder, or at least one file
-/// that a `*` in the last part fits.
+/// True if the path names something that exists: a file or folder, the folder before a placeholder, or at least one
+/// file that a `*` in the last part fits.
 fn exists(path: &str) -> bool {
     let mut folder = root();
     for part in path.split('/').filter(|part| !part.is_empty()) {
