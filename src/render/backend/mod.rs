@@ -1,5 +1,8 @@
 //! Two ways to fill a [`DrawPlan`]: [`cpu`] and [`gpu`], with the same stages in the same order:
-//! transform -> visibility -> shade -> lines -> resolve.
+//! transform -> visibility -> occlusion -> peeling -> shade -> mixed pixels -> lines -> resolve.
+//!
+//! Transform and visibility are in `geometry`, peeling is the transparent layers, and mixed pixels are
+//! drawn once more where samples are adaptive. A plan that has no use for a stage leaves it out.
 //!
 //! Each stage is written twice, in twins of the same name: `shaders/ROOM/NAME.wgsl` and
 //! `src/render/backend/cpu/ROOM/NAME.rs`. The module's tests hold the constants, structs and bindings that

@@ -1,5 +1,5 @@
-//! The commands of README.md and of the documents beside it, typed as they stand there. Of each it is looked at what it prints
-//! and writes. Only the server's address and the words SHA256, ID and $KEY, which stand for what a reader has got, are
+//! Types the commands of README.md and of documents in docs/ as they stand there, and looks at what each prints and
+//! writes. Only the server's address and the words SHA256 and ID, which stand for what an earlier answer has given, are
 //! replaced.
 
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::support::files::bundle::zipped;
 use crate::support::server::{CUBE_OBJ, PATIENCE, Server, meshsnap};
 use crate::support::skip::{Need, skip};
 
-/// The outcome of a command.
+/// What a command does.
 enum Outcome {
     /// It writes a picture of this size.
     Draws(&'static str, [u32; 2]),
@@ -18,18 +18,36 @@ enum Outcome {
     Prints(&'static [&'static str]),
     /// It ends with this code, and prints all of these.
     Ends(i32, &'static [&'static str]),
-    /// It goes on until it is stopped, and has written this picture by then.
+    /// It runs until it is stopped, and has written this picture by then.
     Stays(&'static str, [u32; 2]),
-    /// It is tried elsewhere, or takes what a test has not.
+    /// It is not typed here, for this reason: another test tries it, or it needs what a test has not.
     Elsewhere(&'static str),
 }
 use Outcome::{Draws, Elsewhere, Ends, Prints, Stays};
 
-/// A part of each command, in their order, and its outcome.
+/// A part of each command of the document, in their order, and what the command does.
 const README: &[(&str, Outcome)] = &[
     ("cargo run --release -- serve", Elsewhere("the curl line that it prints is tried in `http::answers`")),
     ("style=wire' -o out.png", Draws("out.png", [512, 512])),
     ("tests/run", Elsewhere("CI begins with it")),
+    ("background=transparent&format=webp", Draws("knot.webp", [512, 512])),
+    ("file=@wood.png", Draws("model.png", [512, 512])),
+    (
+        "rules=watertight,max-triangles:100000",
+        Prints(&["\"rule\":\"watertight\"", "\"rule\":\"max-triangles\"", "\"ok\":true"]),
+    ),
+    ("cargo install --path .", Elsewhere("`cargo xtask package` builds the crate")),
+    ("--size 800x600 --view top", Draws("knot.png", [800, 600])),
+    ("'more/*.stl' -o pictures/", Prints(&["3 drawn, 0 failed"])),
+    ("meshsnap inspect api/examples/knot.obj", Prints(&["triangles    4480", "volume 17.1457", "watertight"])),
+    ("meshsnap check parts/ --rules", Ends(1, &["watertight: 4 open edges in 1 loop", "1 ok, 1 failed"])),
+    ("meshsnap diff old/hinge.stl new/hinge.stl", Ends(1, &["moved by (0, 0, 1.5)"])),
+    ("docker build", Elsewhere("takes a container engine")),
+    ("docker run", Elsewhere("takes a container engine")),
+    ("Authorization: Bearer choose-one", Draws("out.png", [512, 512])),
+];
+
+const HTTP: &[(&str, Outcome)] = &[
     ("style=outline&size=256&view=front", Draws("front.png", [256, 256])),
     ("background=transparent&format=webp", Draws("knot.webp", [512, 512])),
     ("style=xray", Draws("xray.png", [512, 512])),
@@ -58,7 +76,9 @@ const README: &[(&str, Outcome)] = &[
     ("/v1/diff", Prints(&["\"same\": false", "the whole mesh moved by (0, 0, 1.5)"])),
     ("-o heat.png", Draws("heat.png", [1024, 512])),
     ("Idempotency-Key: build-118", Prints(&["HTTP/1.1 202 Accepted"])),
-    ("cargo install --path .", Elsewhere("`cargo xtask package` builds the crate")),
+];
+
+const COMMAND_LINE: &[(&str, Outcome)] = &[
     ("--size 800x600 --view top", Draws("knot.png", [800, 600])),
     ("< api/examples/knot.obj > knot.png", Draws("knot.png", [512, 512])),
     ("--sheet front,left,top,iso", Draws("sheet.png", [512, 512])),
@@ -68,19 +88,16 @@ const README: &[(&str, Outcome)] = &[
     ("--siblings", Stays("model.png", [512, 512])),
     ("'more/*.stl' -o pictures/", Prints(&["3 drawn, 0 failed"])),
     ("meshsnap inspect api/examples/knot.obj", Prints(&["triangles    4480", "volume 17.1457", "watertight"])),
-    ("meshsnap check parts/ --rules", Ends(1, &["watertight: 4 open edges in 1 loop", "1 ok, 1 failed"])),
-    ("--html page.html", Prints(&["2 ok, 0 failed"])),
     ("meshsnap inspect part.stl --print --parts", Prints(&["at least 2 thick", "open loops 0"])),
     ("meshsnap inspect model.glb --uv", Prints(&["stretch 1.000 (L2), 1.000 (Linf)"])),
     ("meshsnap inspect parts/ --jsonl", Prints(&["open.stl", "sound.stl"])),
     ("meshsnap diff old/hinge.stl new/hinge.stl", Ends(1, &["moved by (0, 0, 1.5)"])),
     ("--side-by-side seen.png", Prints(&["no pixel differs"])),
-    ("docker build", Elsewhere("takes a container engine")),
-    ("docker run", Elsewhere("takes a container engine")),
-    ("Authorization: Bearer choose-one", Draws("out.png", [512, 512])),
 ];
 
 const CHECKS: &[(&str, Outcome)] = &[
+    ("meshsnap check parts/ --rules", Ends(1, &["watertight: 4 open edges in 1 loop", "1 ok, 1 failed"])),
+    ("--html page.html", Prints(&["2 ok, 0 failed"])),
     ("warn=has-normals", Prints(&["\"ok\":true,\"checks\"", "\"detail\":\"it has no vertex normals\""])),
     ("fail=422' > verdict.json", Prints(&[])),
     ("kind=check", Prints(&["HTTP/1.1 202 Accepted"])),
@@ -292,6 +309,8 @@ fn what_the_documents_say_is_what_happens() {
     let mut ran = 0;
     for (document, rows) in [
         ("README.md", README),
+        ("docs/http.md", HTTP),
+        ("docs/command-line.md", COMMAND_LINE),
         ("docs/checks.md", CHECKS),
         ("docs/operations.md", OPERATIONS),
         ("docs/ci/README.md", PIPELINES),
@@ -306,5 +325,5 @@ fn what_the_documents_say_is_what_happens() {
         ran += type_all(document, rows, folder.path());
     }
     println!("{ran} commands");
-    assert_eq!(ran, 56);
+    assert_eq!(ran, 64);
 }

@@ -358,7 +358,8 @@ pub fn sources() -> Vec<(String, String)> {
     files.iter().map(|path| (name(path), std::fs::read_to_string(path).unwrap())).collect()
 }
 
-fn files_below(folder: &Path, extension: &str, files: &mut Vec<PathBuf>) {
+/// Adds the files below a folder whose names end with this extension. Links are left out.
+pub fn files_below(folder: &Path, extension: &str, files: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.is_symlink() {

@@ -1,9 +1,10 @@
 //! The CPU rasterizer: the reference for bytes.
 //!
-//! Stages in order: transform and visibility in `geometry`, shade in `surface` and, for
-//! transparent surfaces, in `peeling`, `lines`, `resolve`. `bands` runs them: the picture
-//! is cut into bands of rows that fit a core's cache, threads take bands, and no band depends on
-//! another. The hot loops are compiled once per instruction set (`isa`).
+//! Stages in order: transform and visibility in `geometry`, then `occlusion`, `peeling`, shade in
+//! `surface`, `mixed`, `lines`, `resolve`. Transform and occlusion look at the whole picture. `bands`
+//! runs the others: the picture is cut into bands of rows that fit a core's cache, threads take
+//! bands, and no band depends on another. The hot loops are compiled once per instruction set
+//! (`isa`).
 //!
 //! **Invariant:** threads and instruction sets do not change a byte.
 
