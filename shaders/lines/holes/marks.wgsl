@@ -1,4 +1,5 @@
-// Stage lines: marks of pixels in which areas do not tell what lines leave free. The kernels declare the buffers.
+// Stage lines, per pixel: marks the pixels in which the summed areas of insets do not tell how much
+// the lines leave free. Shared by holes.wgsl and tips.wgsl, which declare the buffer `strokes`.
 
 // Marks the shown pixels up to `reach` columns and rows from one.
 fn mark_around(pixel: vec2<i32>, reach: i32, marks: u32) {

@@ -1,8 +1,8 @@
-//! All that the shaders and the code around them must agree on: constants, structs in buffers,
-//! bindings, entry points.
+//! Tests that the shaders and the Rust code beside them agree on constants, structs in buffers,
+//! bindings and entry points.
 //!
-//! WGSL has no include and Rust cannot read it, so both sides write these down. Here the shaders
-//! are parsed and each constant, field and binding is compared; one that neither
+//! WGSL has no include and Rust cannot read it, so both sides write these down. The tests parse the
+//! shaders and compare each constant, field and binding. A constant that neither
 //! [`shared_constants`] nor [`SHADER_ONLY`] lists is a failure too.
 
 use std::collections::BTreeMap;
