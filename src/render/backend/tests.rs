@@ -13,7 +13,7 @@ use wgpu::naga;
 use super::cpu::geometry::transform::{GUARD, OUTSIDE, ScreenVertex};
 use super::cpu::geometry::{clip, samples, steepness};
 use super::cpu::lines::holes::{self, inset, tips};
-use super::cpu::lines::{coverage, hidden_lines, profile, segment, sheets, stroke};
+use super::cpu::lines::{coplanar, coverage, hidden_lines, profile, segment, stroke};
 use super::cpu::mixed::find::breaks;
 use super::cpu::mixed::find::look::{self, kinds};
 use super::cpu::mixed::find::thin;
@@ -95,7 +95,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("EDGE_ON" = tints::EDGE_ON);
     add!("NEARER_RATIO" = steepness::NEARER_RATIO, "SNAP_ERROR" = hidden_lines::SNAP_ERROR);
     add!("INTERVAL_MIN_PX" = hidden_lines::INTERVAL_MIN_PX, "GAP_MIN_PX" = hidden_lines::GAP_MIN_PX);
-    add!("SIDE_MARGIN" = sheets::SIDE_MARGIN, "IN_PLANE" = sheets::IN_PLANE);
+    add!("SIDE_MARGIN" = coplanar::SIDE_MARGIN, "IN_PLANE" = coplanar::IN_PLANE);
     add!("IDS_MAX" = line_shares::IDS_MAX, "INTERVALS_MAX" = line_shares::INTERVALS_MAX);
     add!("LINE_THREADS" = line_shares::LINE_THREADS);
     add!("GAUSS_PLACE" = profile::GAUSS_PLACE, "GAUSS_OUTER" = profile::GAUSS_OUTER);

@@ -1,8 +1,9 @@
-// Stage lines, per edge and triangle: what stands on a sheet that is seen from below. Twin of
-// src/render/backend/cpu/lines/sheets.rs, which says why; edge.wgsl declares the buffers.
+// Stage lines, per edge and triangle: edges that lie in the plane of a triangle that hides their
+// faces. Twin of src/render/backend/cpu/lines/coplanar.rs, which says why. edge.wgsl declares the
+// buffers.
 
-// Least distance of an edge from the sides of a sheet's triangle, 1/256 px. Closer to them it may be an edge of the
-// triangle itself, or of its neighbour, whose vertices are others.
+// Least distance of an edge from the triangle's sides, 1/256 px. A closer edge may be one of the triangle itself, or of
+// a neighbour that has vertices of its own.
 const SIDE_MARGIN: f32 = 4.0;
 
 // Share of positions by which rounding may move them out of a triangle's plane: some units of f32's last place.
