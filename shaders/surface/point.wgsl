@@ -74,9 +74,9 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
             }
         }
         light_here = light(gloss.y, gloss.x, n);
-        if has(TEXTURES) && use_of(m, SLOT_OCCLUSION).texture < frame.image_count {
-            let red = sample_texture(m, SLOT_OCCLUSION, id, b, uv).x;
-            light_here = occluded(light_here, materials[m].occlusion_strength, red, gloss.y, n);
+        if has(TEXTURES) && use_of(m, SLOT_OCCLUSION_TEXTURE).texture < frame.image_count {
+            let red = sample_texture(m, SLOT_OCCLUSION_TEXTURE, id, b, uv).x;
+            light_here = with_occlusion_texture(light_here, materials[m].occlusion_texture_strength, red, gloss.y, n);
         }
         light_here = dimmed(light_here, show.open);
     }

@@ -63,7 +63,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     // Materials: flags, slots, debug views, samplers.
     add_same!("MATERIAL_", flags: FILL FACE_NORMALS DERIVATIVE_NORMALS LIT VERTEX_COLORS MASK BLEND WIRE_BARYCENTRIC
         WIRE_FWIDTH_MIN WIRE_FWIDTH WIRES WIRE_LIT DEBUG_SHIFT OWN_METALLIC OWN_ROUGHNESS BY_ANGLE);
-    add_same!("SLOT_", slots: BASE METALLIC_ROUGHNESS NORMAL EMISSIVE OCCLUSION);
+    add_same!("SLOT_", slots: BASE METALLIC_ROUGHNESS NORMAL EMISSIVE OCCLUSION_TEXTURE);
     add_same!("DEBUG_", debug_views: BARYCENTRIC MIN_BARYCENTRIC EDGE_DISTANCE NORMAL UV FACE_ORIENTATION VERTEX_COLOR);
     add!("JOBS_MAX" = JOBS_MAX);
     add!("WRAP_BITS" = samplers::WRAP_BITS, "WRAP_DOWN_SHIFT" = samplers::DOWN_SHIFT);
@@ -307,7 +307,7 @@ fn layouts() -> Vec<(&'static str, Layout)> {
             "Material",
             layout!(ShadedMaterial {
                 base_color emissive alpha_cutoff wire_color wire_thickness wire_smoothing metallic roughness
-                normal_scale flags opacity facing_opacity occlusion_strength padding_a padding_b padding_c
+                normal_scale flags opacity facing_opacity occlusion_texture_strength padding_a padding_b padding_c
                 textures
             }),
         ),

@@ -56,7 +56,7 @@ const SHADE: &[&str] = &[
     include_str!("../../../shaders/surface/barycentric.wgsl"),
     include_str!("../../../shaders/surface/texture.wgsl"),
     include_str!("../../../shaders/surface/light.wgsl"),
-    include_str!("../../../shaders/surface/occlusion.wgsl"),
+    include_str!("../../../shaders/surface/occlusion_texture.wgsl"),
     include_str!("../../../shaders/surface/wire.wgsl"),
     include_str!("../../../shaders/surface/normal.wgsl"),
     include_str!("../../../shaders/surface/debug.wgsl"),
