@@ -1,4 +1,6 @@
 // Stage shade, per triangle: its material. The CPU's is ShadedMaterial in src/render/plan/surface/mod.rs.
+//
+// Uses: common.wgsl (has, TRIANGLE_MATERIALS), one_job.wgsl or gang.wgsl (frame).
 
 // Triangles' materials, then edge masks, one byte each.
 @group(1) @binding(8) var<storage, read> attributes: array<u32>;

@@ -1,5 +1,7 @@
 // Stage shade, per point: the file's occlusion texture, which darkens ambient light and no other. Twin of
 // src/render/backend/cpu/surface/occlusion_texture.rs.
+//
+// Uses: common.wgsl (dot3, rn), one_job.wgsl or gang.wgsl (frame), surface/light.wgsl (Light).
 
 // The light without the ambient part that the texture's red takes away.
 fn with_occlusion_texture(lit_here: Light, strength: f32, red: f32, metallic: f32, n: vec3<f32>) -> Light {
