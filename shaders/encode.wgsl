@@ -1,5 +1,7 @@
 // Stage resolve: a colour as sRGB bytes. Shared by resolve.wgsl and paint.wgsl. The CPU's is in
 // src/render/backend/cpu/resolve.rs.
+//
+// Uses: common.wgsl (recip, rn, rn3).
 
 // thresholds[k] is the smallest linear value that is stored as k + 1 or more.
 @group(1) @binding(13) var<storage, read> thresholds: array<f32>;

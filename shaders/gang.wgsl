@@ -1,5 +1,7 @@
 // The uniforms of kernels that draw for a gang: up to JOBS_MAX jobs in one dispatch, whose workgroups tell
 // them apart by their third coordinate. src/render/backend/gpu/gang/ explains gangs.
+//
+// Uses: common.wgsl (Batch, Frame, JOBS_MAX).
 
 @group(0) @binding(0) var<uniform> frames: array<Frame, JOBS_MAX>;
 @group(0) @binding(1) var<uniform> batches: array<Batch, JOBS_MAX>;

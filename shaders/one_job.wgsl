@@ -1,4 +1,6 @@
 // The uniforms of kernels that draw for one job.
+//
+// Uses: common.wgsl (Batch, Frame).
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> batch: Batch;

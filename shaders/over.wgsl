@@ -1,5 +1,7 @@
 // Stages lines and resolve: compositing over the background. The CPU's is in
 // src/render/backend/cpu/resolve.rs.
+//
+// Uses: common.wgsl (rn4), one_job.wgsl or gang.wgsl (batch, frame).
 
 // True if the background is part of a pixel's colour already: then the sign of its alpha is set.
 // Otherwise the colour is the surface's over nothing.

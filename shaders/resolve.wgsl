@@ -1,5 +1,9 @@
 // Stage resolve, per pixel: blends the background into the colour, unless lines have done so, and
 // converts it to sRGB bytes. Twin of src/render/backend/cpu/resolve.rs.
+//
+// Uses: common.wgsl (has, HULL, LINES, SURFACE, WORKGROUP), one_job.wgsl or gang.wgsl (batch,
+// begin_job, frame), encode.wgsl (encode, rgba), over.wgsl (background_at, flip_alpha_sign,
+// is_composited, over_background).
 
 // Per pixel. A negative alpha means that lines have already blended the background into this
 // colour; otherwise it is premultiplied, without background.

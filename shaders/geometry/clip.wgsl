@@ -1,6 +1,11 @@
 // Stage transform, per triangle that reaches behind the eye or far outside the picture: clips it
 // and appends the rest, a fan of up to six triangles, to the work list. Twin of
 // src/render/backend/cpu/geometry/clip.rs.
+//
+// Uses: common.wgsl (homogeneous, WORKGROUP), one_job.wgsl (batch), geometry/corners.wgsl (Corners,
+// is_outside, is_peeling_done, screen_triangle, triangles), geometry/culling.wgsl (passes_culling),
+// geometry/planes.wgsl (intersect, is_moderate, plane_distance, snap_clipped),
+// geometry/triangle.wgsl (area_of, pixel_bounds, setup_of), geometry/work.wgsl (append_work_item).
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 

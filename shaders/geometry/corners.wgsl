@@ -1,4 +1,6 @@
 // Stage visibility: a triangle of the plan by its number.
+//
+// Uses: common.wgsl (has, OUTSIDE, PEELING, Vertex), one_job.wgsl or gang.wgsl (batch, frame).
 
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
 @group(1) @binding(3) var<storage, read> vertices: array<Vertex>;

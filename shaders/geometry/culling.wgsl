@@ -1,4 +1,7 @@
 // Stages visibility and mixed: the test that a batch draws a triangle.
+//
+// Uses: common.wgsl (FACES_BACK, FACES_BOTH, FACES_FRONT, has, PASS_BACK_ONLY, PASS_FRONT_ONLY,
+// PASS_MASKS), one_job.wgsl or gang.wgsl (batch), geometry/triangle.wgsl (is_negative, is_zero).
 
 // One byte per triangle.
 @group(1) @binding(24) var<storage, read> pass_masks: array<u32>;

@@ -1,5 +1,7 @@
 // Stage transform: clipping in homogeneous coordinates, shared by triangles (clip.wgsl) and edges
 // (edge.wgsl).
+//
+// Uses: common.wgsl (recip, rn, round_to_i32, Vertex), one_job.wgsl (frame).
 
 // Bound of clipped coordinates, a little inside the guard band so that rounding cannot leave it.
 const BOUND: f32 = 1048064.0;

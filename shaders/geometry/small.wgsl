@@ -1,4 +1,7 @@
 // Stage visibility, per small triangle: the samples that it covers, and its depth at each.
+//
+// Uses: common.wgsl (sample_corner, sample_count, sample_step), geometry/triangle.wgsl (depth_at,
+// edges_of, Setup), peeling/emit_layer.wgsl or samples/emit.wgsl (emit).
 
 // True if triangles are drawn at all.
 fn is_any_wanted() -> bool {

@@ -1,6 +1,8 @@
 // Depths that are compared: what rounding does to them, the slope of a triangle's depth on screen, given its
 // corners times their W, and the areas that its sides span with a point: weights of its corners' depths.
 // Twin of src/render/backend/cpu/geometry/steepness.rs.
+//
+// Uses: common.wgsl (recip, rn, rn2, rn3).
 
 // Smallest ratio of the depth of what lies in front of a line to the line's: covers the rounding of
 // f32.

@@ -2,6 +2,10 @@
 // block of 8 x 8 pixels against the edges, then all threads together fill the blocks that are left, one thread per
 // pixel. Shared by visibility_tile.wgsl and visibility_few.wgsl. What a pixel's thread does is in tile_samples.wgsl
 // or, for mixed pixels, in mixed/lists.wgsl. No twin: the CPU has one loop for all sizes.
+//
+// Uses: common.wgsl (mul_wide, sample_corner, sub_wide, WORKGROUP), geometry/tile_samples.wgsl or
+// mixed/lists.wgsl or mixed/points.wgsl (draw_pixel), geometry/triangle.wgsl (Edges, edges_of,
+// pixel_bounds, Setup).
 
 // Pixels along a side of a tile.
 const TILE_PX: i32 = 64;

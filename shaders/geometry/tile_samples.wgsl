@@ -1,4 +1,7 @@
 // Stage visibility, per pixel of a tile: the samples that a triangle covers, and its depth at each.
+//
+// Uses: common.wgsl (sample_corner, sample_count, sample_step), geometry/triangle.wgsl (depth_at,
+// Edges, Setup), peeling/emit_layer.wgsl or samples/emit.wgsl (emit).
 
 fn draw_pixel(s: Setup, e: Edges, values: vec3<i32>, in_block: vec2<i32>, pixel: vec2<i32>, id: u32) {
     let corner = sample_corner(pixel);

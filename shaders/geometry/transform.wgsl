@@ -3,6 +3,9 @@
 //
 // It also empties the first band's visibility buffer and the first work list: a command for each would cost the
 // device more than the stores do.
+//
+// Uses: common.wgsl (homogeneous, OUTSIDE, recip, rn, round_to_i32, Vertex, WORKGROUP),
+// one_job.wgsl or gang.wgsl (batch, begin_job, frame, job).
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(3) var<storage, read_write> vertices: array<Vertex>;

@@ -1,4 +1,7 @@
 // Stage visibility: a triangle's area, depth plane and edge functions. Shared with shade and lines.
+//
+// Uses: common.wgsl (mul_wide, negate_wide, recip, rn, sub_wide, Vertex, wide_to_f32), one_job.wgsl
+// or gang.wgsl (batch, frame).
 
 struct Setup {
     // Snapped corners, in an order that makes the area positive.

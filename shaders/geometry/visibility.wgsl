@@ -2,6 +2,12 @@
 // src/render/backend/cpu/geometry/visibility.rs.
 //
 // A thread draws a small triangle itself; larger ones go to the work list for visibility_tile.wgsl.
+//
+// Uses: common.wgsl (WORKGROUP), one_job.wgsl or gang.wgsl (batch, begin_job),
+// geometry/corners.wgsl (is_outside, is_peeling_done, screen_triangle), geometry/culling.wgsl
+// (passes_culling), geometry/small.wgsl or mixed/lists.wgsl or mixed/points.wgsl (draw_small,
+// is_any_wanted), geometry/triangle.wgsl (area_of, pixel_bounds, setup_of), geometry/work.wgsl
+// (append_work_item).
 
 @compute @workgroup_size(WORKGROUP)
 fn visibility(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {

@@ -1,5 +1,9 @@
 // Stage visibility where there are few triangles: the workgroups of each draw its tiles, whatever its size, so that
 // no work list is needed. No twin: the CPU has one loop for all sizes.
+//
+// Uses: common.wgsl (WORKGROUP), one_job.wgsl or gang.wgsl (batch, begin_job),
+// geometry/corners.wgsl (is_outside, screen_triangle), geometry/culling.wgsl (passes_culling),
+// geometry/tile.wgsl (draw_tiles), geometry/triangle.wgsl (area_of, pixel_bounds, setup_of).
 
 @compute @workgroup_size(WORKGROUP)
 fn visibility_few(

@@ -1,5 +1,8 @@
 // Stage visibility, per large triangle of the work list: a workgroup draws tile by tile. No twin: the CPU has one
 // loop for all sizes.
+//
+// Uses: common.wgsl (ITEM_VECTORS, JOBS_MAX, WORKGROUP), one_job.wgsl or gang.wgsl (batch,
+// begin_job, frame, job), geometry/tile.wgsl (draw_tiles), geometry/triangle.wgsl (Setup).
 
 struct WorkList {
     // Large and huge ones of each job of a gang.

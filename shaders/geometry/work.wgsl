@@ -1,4 +1,7 @@
 // Stage visibility: the work list of large triangles, for visibility_tile.wgsl.
+//
+// Uses: common.wgsl (ITEM_VECTORS, JOBS_MAX), one_job.wgsl or gang.wgsl (batch, frame, job),
+// geometry/triangle.wgsl (Setup).
 
 struct Counts {
     large: atomic<u32>,

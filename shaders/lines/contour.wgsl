@@ -1,5 +1,9 @@
 // Stage lines, per edge: selects silhouettes and removes edges of faces that face away. Twin of
 // src/render/backend/cpu/lines/contour.rs; edge.wgsl declares the buffers.
+//
+// Uses: common.wgsl (CONTOUR, CONTOURS, has, INSIDE_OUT, OUTSIDE, rn, SKIP_BACK), one_job.wgsl
+// (batch), geometry/triangle.wgsl (area_of, is_negative, is_zero), lines/edge.wgsl (triangles,
+// vertices), lines/segment.wgsl (homogeneous_of).
 
 const NO_FACE: u32 = 0xFFFFFFFFu;
 

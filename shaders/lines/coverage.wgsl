@@ -1,5 +1,14 @@
 // Stage lines, per pixel: the union of its strokes, composited over the colours. Twin of
 // src/render/backend/cpu/lines/coverage.rs.
+//
+// Uses: common.wgsl (ADAPTIVE, FIRST_PASS, first_visibility_sample, has, HOLED, HOLES, HULL,
+// LIT_PASS, PEELING, recip, rn, rn3, rn4, rolled_off, sample_count, SURFACE, TINTED_PASS, Vertex,
+// wide_to_f32, WORKGROUP), one_job.wgsl (batch), geometry/steepness.wgsl (NEARER_RATIO),
+// lines/holes/free_points.wgsl (add_points), lines/stroke_words.wgsl (AREA_UNIT, AREA_WORD,
+// CARRY_WORD, COUNT_WORD, HOLE_UNIT, HOLE_WORD, MARKED, MASK_WORD, MASK_WORDS, POINTS, SLACK_WORD,
+// STROKE_WORDS, STROKED), mixed/place.wgsl (border_at, FEW, number_at), over.wgsl (background_at,
+// flip_alpha_sign, is_composited, over_background), peeling/state.wgsl (ALPHA_MIN, PeelState),
+// peeling/tints.wgsl (tint_at, tint_depths_at, tint_steepness_at, TINTS).
 
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
 @group(1) @binding(3) var<storage, read> vertices: array<Vertex>;

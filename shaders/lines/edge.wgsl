@@ -5,6 +5,13 @@
 // one after the other, each by all threads together. Where dispatches must be short, a workgroup
 // pauses after a number of units of work, and the next dispatch continues there. A unit is a look at
 // shares, the search for what hides one, or the drawing of a part of it.
+//
+// Uses: common.wgsl (has, HOLED, HOLES, LIT_PASS, recip, RIM_PASS, rn, SHOWN_HIDDEN, SHOWN_VISIBLE,
+// TINTED_PASS, Vertex), one_job.wgsl (batch, frame), lines/contour.wgsl (is_drawn, is_silhouette,
+// lighting_face), lines/hidden_lines.wgsl (begin_runs, BEYOND, count_found, has_too_many,
+// is_all_hidden, joined_run, look_around, shows_interval), lines/segment.wgsl (depth_of, point_at,
+// rows_of, Segment, segment_of, SLACK_PX), lines/stroke.wgsl (add_stroke, is_full, place_of,
+// reach_of_line, touches), lines/stroke_words.wgsl (HOLE_WORD, point_marks, STROKE_WORDS, STROKED).
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;

@@ -3,6 +3,14 @@
 //
 // The threads of a workgroup find the triangles and their intervals together. The CPU sorts the
 // intervals; here they are walked through in order.
+//
+// Uses: common.wgsl (CLIPPED, has, OUTSIDE, recip, rn, rn3, sample_count, Vertex), one_job.wgsl
+// (batch, frame), geometry/planes.wgsl (is_moderate), geometry/steepness.wgsl (is_far,
+// MIN_POSITIVE, NEARER_RATIO, sides_of, steepness), geometry/triangle.wgsl (area_of, is_negative,
+// is_zero), lines/contour.wgsl (volume_of), lines/coplanar.wgsl (has_beneath), lines/edge.wgsl
+// (DRAW_RUNS, FIND_ALONG, LINE_THREADS, triangles, vertices), lines/seen.wgsl (has_samples,
+// NOTHING, seen_at), lines/segment.wgsl (depth_of, homogeneous_of, point_at, Segment, walk_pixel,
+// walk_steps).
 
 // Largest position error on screen, 1/256 px: half a unit each for the snapping of a triangle and
 // of an edge, and some for f32.

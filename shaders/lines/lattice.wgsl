@@ -1,5 +1,7 @@
 // Stage lines: where the points of a pixel lie. No twin: the CPU's are LATTICE in
 // src/render/backend/cpu/lines/stroke.rs.
+//
+// Uses: common.wgsl (round_to_i32), lines/stroke_words.wgsl (GENERATOR, POINTS).
 
 // Steps to the pixel in which along and across are measured.
 const UNIT: f32 = 16384.0;

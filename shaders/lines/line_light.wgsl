@@ -3,6 +3,11 @@
 //
 // Light is affine in the colour that it falls on: the mean over the samples that see the surface,
 // or, where none does, the light on the line's own face.
+//
+// Uses: common.wgsl (first_visibility_sample, pixel_corner, sample_count, sample_offset,
+// WORKGROUP), one_job.wgsl (batch, frame), surface/barycentric.wgsl (barycentrics),
+// surface/light.wgsl (light), surface/material.wgsl (material_index, MATERIAL_LIT, materials),
+// surface/normal.wgsl (normal).
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;

@@ -1,5 +1,9 @@
 // Stage lines, per edge: its position on screen and the pixels along it. Twin of
 // src/render/backend/cpu/lines/segment.rs; edge.wgsl declares the buffers.
+//
+// Uses: common.wgsl (CLIPPED, has, homogeneous, OUTSIDE, rn, rn2, rsqrt, Vertex), one_job.wgsl
+// (batch, frame), geometry/planes.wgsl (intersect, is_moderate, plane_distance, snap_clipped),
+// lines/edge.wgsl (positions, vertices), lines/stroke.wgsl (reach_of_line).
 
 // Slack for roundings where only too much is harmless, pixels.
 const SLACK_PX: f32 = 0.05;

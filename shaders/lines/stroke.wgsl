@@ -1,5 +1,10 @@
 // Stage lines, per stroke and pixel: the covered area and the covered points. Twin of
 // src/render/backend/cpu/lines/stroke.rs.
+//
+// Uses: common.wgsl (rn, round_to_i32), one_job.wgsl (batch, frame), geometry/steepness.wgsl
+// (MIN_POSITIVE), lines/edge.wgsl (strokes), lines/lattice.wgsl (lattice_points, product, UNIT,
+// units), lines/stroke_words.wgsl (AREA_UNIT, AREA_WORD, CARRY_WORD, COUNT_WORD, MASK_WORD,
+// MASK_WORDS, POINTS, SLACK_WORD, STROKE_WORDS).
 
 // Farthest from the middle of a unit box to its corner.
 const BOX_RADIUS: f32 = 0.70710678;

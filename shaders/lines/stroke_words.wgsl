@@ -1,5 +1,7 @@
 // The lines stage's buffer of strokes, as edge.wgsl adds to it and coverage.wgsl reads it. No twin:
 // the CPU's is a struct, LineCoverage in src/render/backend/cpu/lines/coverage.rs.
+//
+// Uses: common.wgsl (sample_count).
 
 // Points in a pixel, and the lattice they lie on: point i is in column i and row GENERATOR * i,
 // modulo POINTS.

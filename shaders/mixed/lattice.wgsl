@@ -1,4 +1,6 @@
 // Stage mixed: the coverage points of a pixel. Twin of src/render/backend/cpu/mixed/points.rs.
+//
+// Uses: common.wgsl (rn, rn2).
 
 const POINTS: u32 = 256u;
 const GENERATOR: u32 = 181u;

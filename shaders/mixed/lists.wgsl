@@ -1,5 +1,9 @@
 // Stage mixed, per triangle and mixed pixel: lists of the triangles that each pixel may show. Twin of
 // src/render/backend/cpu/mixed/lists.rs. Items of a list are in no order; nothing depends on it.
+//
+// Uses: common.wgsl (pixel_corner), one_job.wgsl (batch, frame), geometry/triangle.wgsl (Edges,
+// edges_of, Setup), mixed/place.wgsl (FEW, item_at, ITEM_COUNT, list_at, number_at, OVERFLOW),
+// mixed/point_edges.wgsl (is_beside, point_edges).
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
 @group(1) @binding(31) var<storage, read_write> lists: array<vec4<u32>>;

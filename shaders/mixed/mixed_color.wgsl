@@ -1,5 +1,10 @@
 // Stage mixed, per mixed pixel whose points are in memory: its colour by what they see. Twin of
 // src/render/backend/cpu/mixed/color.rs. Pixels that have lists of triangles go through mixed_parts.wgsl instead.
+//
+// Uses: common.wgsl (has, LINES, WORKGROUP), one_job.wgsl (batch), mixed/lattice.wgsl (FEW_STEP,
+// POINTS), mixed/place.wgsl (border_at, BORDER_WORDS, FEW, pixel_at), mixed/share_color.wgsl
+// (share_color), mixed/shares.wgsl (border_word, depth_of_share, find_firsts, firsts, FIRSTS_WORDS,
+// is_first, own_points, seen, share_of).
 
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
 @group(1) @binding(22) var<storage, read_write> mixed: array<u32>;

@@ -1,6 +1,14 @@
 // Stage mixed, per mixed pixel: the triangle of its list that each point sees, and so the parts that its colour is the
 // sum of. Twin of src/render/backend/cpu/mixed/color.rs and faces.rs. The parts' colours: mixed_shade.wgsl; their sum:
 // mixed_sum.wgsl.
+//
+// Uses: common.wgsl (CLIPPED, has, LINES, WORKGROUP), one_job.wgsl (batch), mixed/lattice.wgsl
+// (depth_at_point, FEW_STEP, POINTS, PointTriangle, Share), mixed/place.wgsl (border_at,
+// BORDER_WORDS, FEW, item_at, list_at, LIST_END, OVERFLOW, part_at, PART_COUNT, parts_at,
+// PARTS_OF_PIXEL, pixel_at), mixed/point_sets.wgsl (add_points, clear_sets, find_digit_sets,
+// find_firsts_of_sets, first_of_set, quarters_of_set, share_of_set, WHOLE), mixed/shares.wgsl
+// (border_word, depth_of_share, find_firsts, first_count, firsts_before, is_first, own_points,
+// seen, share_of).
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
 // Items of lists, then parts.

@@ -1,5 +1,8 @@
 // Stage mixed, per part of a mixed pixel: what a triangle adds to the pixel's colour. Twin of
 // src/render/backend/cpu/surface/waiting.rs.
+//
+// Uses: common.wgsl (WORKGROUP), mixed/lattice.wgsl (Share), mixed/place.wgsl (OVERFLOW, part_at,
+// PART_COUNT), mixed/share_color.wgsl (share_color).
 
 @group(1) @binding(22) var<storage, read> mixed: array<u32>;
 // The parts become colours.

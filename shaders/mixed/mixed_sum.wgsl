@@ -1,4 +1,7 @@
 // Stage mixed, per mixed pixel: its colour, the sum of its parts.
+//
+// Uses: common.wgsl (WORKGROUP), mixed/place.wgsl (FEW, part_at, parts_at, PARTS_OF_PIXEL,
+// pixel_at).
 
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
 @group(1) @binding(22) var<storage, read> mixed: array<u32>;

@@ -9,6 +9,8 @@
 // - by number: the first of the pixel's parts, times PARTS_OF_PIXEL, and how many they are
 // - by number, where lines are drawn: the points that see something, as stroke.wgsl numbers them; none where all do, or
 //   few points were enough
+//
+// Uses: one_job.wgsl (batch, frame).
 
 const HEAD_WORDS: u32 = 4u;
 

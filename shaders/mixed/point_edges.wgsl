@@ -1,4 +1,6 @@
 // Stage mixed: edge functions at the points of a pixel.
+//
+// Uses: common.wgsl (mul_wide, sub_wide), geometry/triangle.wgsl (Edges, Setup).
 
 // Largest column or row of a point.
 const PLACE_MAX: i32 = 255;

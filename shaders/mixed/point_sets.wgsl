@@ -1,6 +1,9 @@
 // Stage mixed, per pixel that a workgroup has in hand: the points that see each of its triangles, as sets. Twin of
 // src/render/backend/cpu/mixed/points.rs. Sets make the shares of up to as many triangles as there are threads; shares.wgsl
 // looks at all points of a pixel instead, for more.
+//
+// Uses: common.wgsl (recip, rn2, WORKGROUP), mixed/lattice.wgsl (FEW_STEP, point_place, POINTS,
+// Share), mixed/shares.wgsl (firsts, FIRSTS_WORDS, seen), surface/material.wgsl (is_quartered).
 
 // By item of the pixel's list: the points that see it, a bit each.
 var<workgroup> sets: array<atomic<u32>, SETS_WORDS>;

@@ -1,5 +1,10 @@
 // Stage mixed, per triangle and mixed pixel: the points that the triangle covers, and its depth at each. Twin of
 // src/render/backend/cpu/mixed/triangle/mod.rs.
+//
+// Uses: common.wgsl (pixel_corner), one_job.wgsl (batch, frame), geometry/triangle.wgsl (Edges,
+// edges_of, Setup), mixed/lattice.wgsl (depth_at_point, FEW_FIRST, FEW_STEP, POINTS,
+// PointTriangle), mixed/place.wgsl (FEW, number_at), mixed/point_edges.wgsl (is_beside,
+// point_edges), samples/samples32.wgsl or samples/samples64.wgsl (keep_nearest).
 
 @group(1) @binding(22) var<storage, read> mixed: array<u32>;
 

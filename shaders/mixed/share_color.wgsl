@@ -1,4 +1,8 @@
 // Stage mixed, per triangle in a mixed pixel: its colour.
+//
+// Uses: common.wgsl (first_visibility_sample, has, OCCLUSION, pixel_corner, rn4, SURFACE),
+// one_job.wgsl (batch, frame), mixed/lattice.wgsl (Share), occlusion/spread.wgsl (open_share),
+// surface/hull.wgsl (hull_color), surface/point.wgsl (point_color, Show).
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;

@@ -1,5 +1,8 @@
 // Stage mixed, per pixel that a workgroup has in hand: the share of its points that each triangle has. Twin of
 // src/render/backend/cpu/mixed/shares.rs.
+//
+// Uses: common.wgsl (recip, rn2, WORKGROUP), mixed/lattice.wgsl (FEW_FIRST, FEW_STEP, point_place,
+// POINTS, Share), surface/material.wgsl (is_quartered).
 
 // The triangle that each point sees, in words like those of samples; and which points are the first ones of their
 // triangles, a bit each.

@@ -1,5 +1,9 @@
 // Stage occlusion, per pixel of every second column and row: looks at places around it and adds up what light they
 // take. Twin of src/render/backend/cpu/occlusion/gather.rs.
+//
+// Uses: common.wgsl (dot3, pixel_corner, quick_rsqrt, rn, rn2, rn3, round_to_i32, sample_offset,
+// WORKGROUP), one_job.wgsl or gang.wgsl (batch, begin_job, frame), occlusion/place.wgsl
+// (is_in_picture, NOWHERE).
 
 // Of each job of a gang: places of all pixels of the picture, then what each found.
 @group(1) @binding(30) var<storage, read_write> occlusion: array<u32>;

@@ -1,5 +1,8 @@
 // Stage occlusion, per pixel: the place of what its first sample shows, before the far plane. Twin of
 // src/render/backend/cpu/occlusion/grid.rs.
+//
+// Uses: common.wgsl (first_visibility_sample, WORKGROUP), one_job.wgsl or gang.wgsl (batch,
+// begin_job, frame), occlusion/place.wgsl (NOWHERE, place_of).
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;

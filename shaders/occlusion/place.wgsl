@@ -1,4 +1,6 @@
 // Stage occlusion: places before the far plane. The CPU's are in src/render/backend/cpu/occlusion/grid.rs.
+//
+// Uses: common.wgsl (recip, rn), one_job.wgsl or gang.wgsl (frame).
 
 // The place of nothing: so far behind all else that no surface takes light from it.
 const NOWHERE: f32 = -1e15;

@@ -1,5 +1,8 @@
 // Stage occlusion, per pixel: a weighted mean of what pixels around it that show the same surface found. Twin of
 // src/render/backend/cpu/occlusion/spread.rs.
+//
+// Uses: common.wgsl (rn, round_to_i32), one_job.wgsl or gang.wgsl (frame), occlusion/place.wgsl
+// (is_in_picture, NOWHERE, place_of).
 
 @group(1) @binding(30) var<storage, read> occlusion: array<u32>;
 

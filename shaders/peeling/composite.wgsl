@@ -1,5 +1,12 @@
 // Stage shade, per pixel: composites a peeled layer's colours under those of the layers in front of
 // it. Twin of src/render/backend/cpu/peeling/composite.rs.
+//
+// Uses: common.wgsl (CLIPPED, has, homogeneous, OUTSIDE, PEELED_HULL, rn4, sample_count,
+// WIRES_ONLY, WORKGROUP), one_job.wgsl (batch, frame), geometry/steepness.wgsl (is_far, steepness),
+// peeling/state.wgsl (ALPHA_MIN, PeelState), peeling/tints.wgsl (EDGE_ON, keeps_tints, tint_at,
+// tint_depths_at, tint_steepness_at, TINTS), surface/barycentric.wgsl (corner_position, triangles,
+// vertices), surface/group.wgsl (first_group, Group, group_color, seen_samples,
+// single_sample_group), surface/hull.wgsl (hull_material, NOTHING), surface/point.wgsl (Show).
 
 // The layer of this round, laid out as the visibility buffer.
 @group(1) @binding(26) var<storage, read> peel_layer: array<vec2<u32>>;

@@ -1,5 +1,9 @@
 // Stage visibility, per sample of a peeled layer: keeps the nearest triangle behind the previous
 // layer. Twin of src/render/backend/cpu/peeling/emit_layer.rs.
+//
+// Uses: common.wgsl (BEHIND_SURFACE, has, sample_count), one_job.wgsl (batch), peeling/state.wgsl
+// (PeelState), samples/samples.wgsl (sample_index), samples/samples32.wgsl or
+// samples/samples64.wgsl (keep_nearest).
 
 // The visibility buffer; `samples` is bound to the layer.
 @group(1) @binding(26) var<storage, read> base: array<vec2<u32>>;

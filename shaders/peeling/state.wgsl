@@ -1,5 +1,7 @@
 // Stage shade, per sample: the state of depth peeling. Twin of src/render/backend/cpu/peeling/state.rs.
 // Written by composite.wgsl, read by emit_layer.wgsl, mixed_pixels.wgsl, shade.wgsl and coverage.wgsl.
+//
+// Uses: nothing.
 
 // Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent
 // pictures.

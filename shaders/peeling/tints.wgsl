@@ -2,6 +2,8 @@
 // coverage.wgsl finds it. Twin of src/render/backend/cpu/peeling/tints.rs. Both declare `colors`, which
 // holds, for all pixels of the band each: colours, the light on lines, the colour that each layer
 // adds, the layers' depths, and their steepness.
+//
+// Uses: common.wgsl (has, LINES), one_job.wgsl (batch, frame).
 
 // Layers that are told apart. All from the last of these on count as one, as far away as the
 // farthest of them.

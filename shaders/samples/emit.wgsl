@@ -1,4 +1,7 @@
 // Stage visibility, per sample: writes to the visibility buffer.
+//
+// Uses: one_job.wgsl or gang.wgsl (batch), samples/samples.wgsl (sample_index),
+// samples/samples32.wgsl or samples/samples64.wgsl (keep_nearest).
 
 fn emit(pixel: vec2<i32>, n: i32, z: f32, id: u32) {
     keep_nearest(batch.samples_at + sample_index(pixel.x, pixel.y, n), z, id);

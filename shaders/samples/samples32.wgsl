@@ -1,6 +1,8 @@
 // Stage visibility, per sample, without 64-bit atomics, in two phases over all triangles: first the
 // nearest depth, then, where a triangle computes just that depth again, the lowest id. The memory
 // is the same as with 64 bits: low word, high word.
+//
+// Uses: nothing.
 
 @group(1) @binding(4) var<storage, read_write> samples: array<atomic<u32>>;
 

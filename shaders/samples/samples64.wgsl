@@ -1,4 +1,6 @@
 // Stage visibility, per sample, with 64-bit atomics: one maximum takes depth and id together.
+//
+// Uses: nothing.
 
 @group(1) @binding(4) var<storage, read_write> samples: array<atomic<u64>>;
 

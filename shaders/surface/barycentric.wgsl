@@ -1,5 +1,8 @@
 // Stage shade, per point: its position in its triangle. Twin of
 // src/render/backend/cpu/surface/barycentric.rs.
+//
+// Uses: common.wgsl (CLIPPED, has, homogeneous, OUTSIDE, recip, rn2, rn3, rn4, Vertex),
+// one_job.wgsl or gang.wgsl (frame), geometry/triangle.wgsl (area_of, is_negative).
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;

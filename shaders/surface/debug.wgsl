@@ -1,5 +1,11 @@
 // Stage shade, per point: debug views, which show a triangle's numbers as colours. Twin of
 // src/render/backend/cpu/surface/debug.rs.
+//
+// Uses: common.wgsl (dot3, has, rn2, rn3, UVS, VERTEX_COLORS), one_job.wgsl or gang.wgsl (frame),
+// surface/barycentric.wgsl (Barycentrics, corners_of, edge_distances_px), surface/light.wgsl
+// (light, lit), surface/material.wgsl (MATERIAL_LIT, materials), surface/normal.wgsl (normal),
+// surface/point.wgsl (vertex_color), surface/texture.wgsl (bounded, uv_of), surface/wire.wgsl
+// (drawn_edges).
 
 // Values of the debug view in a material's flags.
 const DEBUG_BARYCENTRIC: u32 = 1u;

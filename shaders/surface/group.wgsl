@@ -1,5 +1,10 @@
 // Stage shade, per pixel: groups the samples that show the same triangle. Shared by shade.wgsl and
 // composite.wgsl, each of which defines triangle_of_sample(sample).
+//
+// Uses: common.wgsl (ADAPTIVE, has, pixel_corner, recip, rn2, sample_count, sample_offset,
+// SURFACE), one_job.wgsl or gang.wgsl (frame), peeling/composite.wgsl or surface/paint.wgsl or
+// surface/shade.wgsl (triangle_of_sample), surface/hull.wgsl (hull_color, NOTHING),
+// surface/material.wgsl (is_quartered), surface/point.wgsl (point_color, Show).
 
 @group(1) @binding(24) var<storage, read> pass_masks: array<u32>;
 

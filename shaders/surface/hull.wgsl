@@ -1,4 +1,6 @@
 // Stages shade and mixed: colours of the outline mesh's triangles, and the id of no triangle.
+//
+// Uses: common.wgsl (has, HULL_MATERIALS), one_job.wgsl or gang.wgsl (frame).
 
 // Colours, then the materials of the surface's triangles and of the hull's.
 @group(1) @binding(25) var<storage, read> hull_materials: array<u32>;

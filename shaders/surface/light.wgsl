@@ -2,6 +2,8 @@
 //
 // The CPU's bits: a whole flat face has one light, and that may lie on the threshold between two
 // bytes.
+//
+// Uses: common.wgsl (dot3, quick_recip, rn, rn3, rolled_off), one_job.wgsl or gang.wgsl (frame).
 
 // Effect of light on a base colour: base * gain + gloss, per channel.
 struct Light {

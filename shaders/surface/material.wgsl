@@ -1,4 +1,6 @@
 // Stage shade, per triangle: its material. The CPU's is ShadedMaterial in src/render/plan/surface/mod.rs.
+//
+// Uses: common.wgsl (has, TRIANGLE_MATERIALS), one_job.wgsl or gang.wgsl (frame).
 
 // Triangles' materials, then edge masks, one byte each.
 @group(1) @binding(8) var<storage, read> attributes: array<u32>;
@@ -18,7 +20,7 @@ struct Material {
     flags: u32,
     opacity: f32,
     facing_opacity: f32,
-    occlusion_strength: f32,
+    occlusion_texture_strength: f32,
     padding_a: u32,
     padding_b: u32,
     padding_c: u32,
@@ -50,7 +52,7 @@ const SLOT_BASE: u32 = 0u;
 const SLOT_METALLIC_ROUGHNESS: u32 = 1u;
 const SLOT_NORMAL: u32 = 2u;
 const SLOT_EMISSIVE: u32 = 3u;
-const SLOT_OCCLUSION: u32 = 4u;
+const SLOT_OCCLUSION_TEXTURE: u32 = 4u;
 
 // Metals below this roughness mirror sharply.
 const MIRROR_ROUGHNESS: f32 = 0.5;

@@ -1,4 +1,10 @@
 // Stage shade, per point: the normal for lighting. Twin of src/render/backend/cpu/surface/normal.rs.
+//
+// Uses: common.wgsl (DERIVATIVE_NORMALS, dot3, FACE_NORMALS, has, rn, rn3, VERTEX_NORMALS),
+// one_job.wgsl or gang.wgsl (frame), surface/barycentric.wgsl (Barycentrics, blend3,
+// corner_position, quad_around, triangles), surface/material.wgsl (MATERIAL_DERIVATIVE_NORMALS,
+// MATERIAL_FACE_NORMALS, materials, SLOT_NORMAL), surface/point.wgsl (corner_triangles),
+// surface/texture.wgsl (sample_texture, set_at, transformed, use_of, Uv, uvs).
 
 @group(1) @binding(6) var<storage, read> normals: array<f32>;
 @group(1) @binding(16) var<storage, read> face_normals: array<f32>;

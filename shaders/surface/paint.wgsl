@@ -1,5 +1,10 @@
 // Stages shade and resolve in one, per pixel, where no lines are drawn, no layers peeled and no hollows dimmed: what shade.wgsl and
 // resolve.wgsl do, without the colours in between. No twin: the CPU has a path for flat faces instead.
+//
+// Uses: common.wgsl (first_visibility_sample, rn, rn4, sample_count, WORKGROUP), one_job.wgsl or
+// gang.wgsl (batch, begin_job, frame), encode.wgsl (encode, rgba), over.wgsl (background_at,
+// over_background), surface/group.wgsl (first_group, group_color, seen_samples,
+// single_sample_group), surface/hull.wgsl (NOTHING), surface/point.wgsl (Show).
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;

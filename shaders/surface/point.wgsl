@@ -1,5 +1,17 @@
 // Stage shade, per point: the colour of a point of the surface. Twin of
 // src/render/backend/cpu/surface/point.rs.
+//
+// Uses: common.wgsl (DEBUG, has, OCCLUSION, rn, rn3, rn4, rolled_off, TEXTURES, VARYING,
+// VERTEX_COLORS, WIRE_LIT, WIRES), one_job.wgsl or gang.wgsl (frame), surface/barycentric.wgsl
+// (Barycentrics, barycentrics, blend4, is_front), surface/debug.wgsl (debug_color),
+// surface/light.wgsl (Light, light, lit, unlit), surface/material.wgsl (MATERIAL_BLEND,
+// MATERIAL_BY_ANGLE, MATERIAL_DEBUG_SHIFT, MATERIAL_FACE_NORMALS, MATERIAL_FILL, material_index,
+// MATERIAL_LIT, MATERIAL_MASK, MATERIAL_OWN_METALLIC, MATERIAL_OWN_ROUGHNESS,
+// MATERIAL_VERTEX_COLORS, MATERIAL_WIRE_LIT, MATERIAL_WIRES, materials, SLOT_BASE, SLOT_EMISSIVE,
+// SLOT_METALLIC_ROUGHNESS, SLOT_NORMAL, SLOT_OCCLUSION_TEXTURE), surface/normal.wgsl (angle_share,
+// face_normal, normal, normal_mapped, turned_to_viewer), surface/occlusion_texture.wgsl
+// (with_occlusion_texture), surface/texture.wgsl (sample_texture, use_of, Uv, uv_of),
+// surface/wire.wgsl (wire_cover).
 
 // Three indices per triangle, for each kind of corner value that does not go by position.
 @group(1) @binding(7) var<storage, read> corner_triangles: array<u32>;
@@ -74,9 +86,9 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
             }
         }
         light_here = light(gloss.y, gloss.x, n);
-        if has(TEXTURES) && use_of(m, SLOT_OCCLUSION).texture < frame.image_count {
-            let red = sample_texture(m, SLOT_OCCLUSION, id, b, uv).x;
-            light_here = occluded(light_here, materials[m].occlusion_strength, red, gloss.y, n);
+        if has(TEXTURES) && use_of(m, SLOT_OCCLUSION_TEXTURE).texture < frame.image_count {
+            let red = sample_texture(m, SLOT_OCCLUSION_TEXTURE, id, b, uv).x;
+            light_here = with_occlusion_texture(light_here, materials[m].occlusion_texture_strength, red, gloss.y, n);
         }
         light_here = dimmed(light_here, show.open);
     }

@@ -1,5 +1,11 @@
 // Stage shade, per pixel: the colour of each visible triangle. Twin of
 // src/render/backend/cpu/surface/shade.rs.
+//
+// Uses: common.wgsl (first_visibility_sample, has, OCCLUSION, PASS_LAYER, PEELING, rn, rn4,
+// sample_count, WIRES_ONLY, WORKGROUP), one_job.wgsl or gang.wgsl (batch, begin_job, frame),
+// occlusion/spread.wgsl (open_share), peeling/state.wgsl (PeelState), surface/group.wgsl
+// (first_group, group_color, pass_masks, seen_samples, single_sample_group), surface/hull.wgsl
+// (NOTHING), surface/point.wgsl (Show).
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;

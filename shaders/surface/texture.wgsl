@@ -1,5 +1,9 @@
 // Stage shade, per point: texture lookups. Twin of src/render/backend/cpu/surface/texture/mod.rs: the same
 // bits, because texels decide what a mask leaves and where nearest texels change.
+//
+// Uses: common.wgsl (quick_recip, quick_rsqrt, rn, rn2, rn4), one_job.wgsl or gang.wgsl (frame),
+// surface/barycentric.wgsl (Barycentrics, blend2), surface/material.wgsl (is_quartered, materials,
+// SLOT_BASE, SLOT_EMISSIVE), surface/point.wgsl (corner_triangles).
 
 @group(1) @binding(18) var<storage, read> uvs: array<vec2<f32>>;
 // Four items an image, as `TextureEntry` in src/render/backend/gpu/params.rs has them; then texels, two halves a word.

@@ -1,5 +1,9 @@
 // Stage shade, per point: wires from barycentric coordinates. Twin of
 // src/render/backend/cpu/surface/wire.rs.
+//
+// Uses: common.wgsl (EDGE_MASKS, has, rn, WIRE_MINIMUM), one_job.wgsl or gang.wgsl (frame),
+// surface/barycentric.wgsl (Barycentrics, quad_around), surface/material.wgsl (attributes,
+// MATERIAL_WIRE_BARYCENTRIC, MATERIAL_WIRE_FWIDTH, MATERIAL_WIRE_FWIDTH_MIN, materials).
 
 // 1 on the wire, 0 away from it.
 fn wire_cover(id: u32, at: vec2<f32>, m: u32, b: Barycentrics) -> f32 {

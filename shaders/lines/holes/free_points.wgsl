@@ -1,5 +1,11 @@
 // Stage lines, per marked pixel: the points that its faces leave free. Twin of
 // src/render/backend/cpu/lines/holes/free_points.rs. coverage.wgsl declares the buffers.
+//
+// Uses: common.wgsl (pixel_corner, rn, sample_count), one_job.wgsl (batch, frame),
+// lines/coverage.wgsl (sample_masks, strokes, triangles, vertices), lines/holes/inset.wgsl
+// (inset_of, Side), lines/lattice.wgsl (lattice_points, product, units), lines/seen.wgsl (seen_at),
+// lines/stroke_words.wgsl (AREA_UNIT, AREA_WORD, CARRY_WORD, COUNT_WORD, MASK_WORD, MASK_WORDS,
+// STROKE_WORDS).
 
 // A side of an inset: the points at least `least` along the normal lie inside. Both in 1/16384 px.
 struct HalfPlane {

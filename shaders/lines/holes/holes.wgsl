@@ -3,6 +3,12 @@
 //
 // The CPU goes from face to face. A thread here looks for the faces that are seen in its pixel and
 // the eight around it, so that no two threads add to the same sum.
+//
+// Uses: common.wgsl (LIT_PASS, OUTSIDE, pixel_corner, rn, rn2, sample_count, sample_offset, Vertex,
+// WORKGROUP), one_job.wgsl (batch, frame), geometry/triangle.wgsl (area_of, is_zero, setup_of),
+// lines/holes/inset.wgsl (Inset, inset_area, inset_contains, inset_of), lines/holes/marks.wgsl
+// (mark_around), lines/seen.wgsl (has_samples, NOTHING, seen_at), lines/stroke_words.wgsl
+// (HOLE_WORD, MARKED, point_marks, STROKE_WORDS, STROKED).
 
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
 @group(1) @binding(3) var<storage, read> vertices: array<Vertex>;

@@ -1,5 +1,8 @@
 // Stage lines, per face: the part of it that its lines leave free. Twin of
 // src/render/backend/cpu/lines/holes/inset/mod.rs. The kernels declare the buffers.
+//
+// Uses: common.wgsl (recip, rn, rn2, rn3, rsqrt), one_job.wgsl (batch, frame),
+// lines/stroke_words.wgsl (HOLE_UNIT).
 
 // Distance from a face's sides from which a sample counts as inside, 1/256 px.
 const INSIDE: f32 = 16.0;

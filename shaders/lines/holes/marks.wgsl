@@ -1,4 +1,8 @@
-// Stage lines: marks of pixels in which areas do not tell what lines leave free. The kernels declare the buffers.
+// Stage lines, per pixel: marks the pixels in which the summed areas of insets do not tell how much
+// the lines leave free. Shared by holes.wgsl and tips.wgsl, which declare the buffer `strokes`.
+//
+// Uses: one_job.wgsl (batch, frame), lines/holes/holes.wgsl or lines/holes/tips.wgsl (strokes),
+// lines/stroke_words.wgsl (HOLE_WORD, STROKE_WORDS).
 
 // Marks the shown pixels up to `reach` columns and rows from one.
 fn mark_around(pixel: vec2<i32>, reach: i32, marks: u32) {

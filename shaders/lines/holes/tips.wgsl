@@ -1,5 +1,11 @@
 // Stage lines, per triangle: its tips, which are corners in front of all that their pixel shows, of which no sample of
 // the pixel shows the triangle. Twin of src/render/backend/cpu/lines/holes/tips.rs.
+//
+// Uses: common.wgsl (mul_wide, OUTSIDE, rn, sample_count, sub_wide, Vertex, WORKGROUP),
+// one_job.wgsl (batch, frame), geometry/culling.wgsl (passes_culling), geometry/triangle.wgsl
+// (area_of, is_negative, is_zero, setup_of), lines/holes/inset.wgsl (inset_of),
+// lines/holes/marks.wgsl (mark_around), lines/seen.wgsl (has_samples, NOTHING, seen_at),
+// lines/stroke_words.wgsl (MARKED, STROKED).
 
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
 @group(1) @binding(3) var<storage, read> vertices: array<Vertex>;

@@ -1,5 +1,9 @@
 // Stage mixed, per pixel of a band and one more on each side: where colours break off from sample to sample. Twin of
 // find_breaks in src/render/backend/cpu/mixed/find/mod.rs.
+//
+// Uses: common.wgsl (has, sample_count, SIXTEEN_SAMPLES, WORKGROUP), one_job.wgsl (batch, frame),
+// mixed/find/look.wgsl (step_between), mixed/find/seen_faces.wgsl (BREAKS_LEFT, breaks_of,
+// BREAKS_OWN, BREAKS_UPPER, id_at, is_seen), mixed/place.wgsl (breaks_at, HEAD_WORDS).
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<u32>;
 

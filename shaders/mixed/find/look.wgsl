@@ -1,5 +1,14 @@
 // Stage mixed, per face: what decides its colour, as far as that is known without shading it. Twin of
 // src/render/backend/cpu/mixed/find/look.rs.
+//
+// Uses: common.wgsl (has, OUTSIDE, rn3, SURFACE, TRIANGLE_MATERIALS, UVS, Vertex, VERTEX_COLORS,
+// VERTEX_NORMALS), one_job.wgsl (frame), geometry/triangle.wgsl (area_of, is_negative),
+// surface/barycentric.wgsl (triangles, vertices), surface/hull.wgsl (hull_color, NOTHING),
+// surface/material.wgsl (attributes, MATERIAL_BLEND, MATERIAL_BY_ANGLE, MATERIAL_DEBUG_SHIFT,
+// MATERIAL_DERIVATIVE_NORMALS, MATERIAL_FACE_NORMALS, material_index, MATERIAL_LIT, MATERIAL_MASK,
+// MATERIAL_VERTEX_COLORS, MATERIAL_VERTEX_NORMALS, MATERIAL_WIRES, materials, mirrors_sharply,
+// TEXTURE_NONE), surface/normal.wgsl (face_normal, normal_at, OWN_TRIANGLES, turned_to_viewer),
+// surface/point.wgsl (corner_triangles), surface/texture.wgsl (use_of).
 
 // Squared differences over sums up to which faces look alike, and up to which they differ slightly.
 const ALIKE: f32 = 0.020833334;

@@ -1,5 +1,9 @@
 // Stage mixed, per pixel: the mixed pixels, and the number of each. Twin of join and leave_layers in
 // src/render/backend/cpu/mixed/find/mod.rs. Numbers are in no order; nothing depends on it.
+//
+// Uses: common.wgsl (has, PEELING, sample_count, WORKGROUP), one_job.wgsl (batch, frame),
+// mixed/place.wgsl (breaks_at, FEW, list_at, LIST_END, number_at, pixel_at), peeling/state.wgsl
+// (ALPHA_MIN, PeelState).
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
 // Peeled layers per sample.

@@ -1,4 +1,7 @@
 // Stage mixed: the faces that samples show, and where colours break off from one to the next.
+//
+// Uses: common.wgsl (sample_count), one_job.wgsl (batch, frame), mixed/find/look.wgsl (STEP_HARD,
+// STEP_NONE), surface/hull.wgsl (NOTHING).
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;

@@ -1,5 +1,12 @@
 // Stage mixed, per triangle: those that are so thin that samples miss them, as hairs and slivers. Twin of
 // src/render/backend/cpu/mixed/find/thin.rs and thinness.rs.
+//
+// Uses: common.wgsl (has, mul_wide, negate_wide, OUTSIDE, pixel_corner, SIXTEEN_SAMPLES, sub_wide,
+// WORKGROUP), one_job.wgsl (batch, frame), geometry/culling.wgsl (passes_culling),
+// geometry/triangle.wgsl (area_of, Edges, edges_of, is_negative, Setup, setup_of),
+// mixed/find/look.wgsl (corner_on_screen, step_between), mixed/find/seen_faces.wgsl (breaks_of,
+// BREAKS_THIN, depth_of, id_at), mixed/place.wgsl (breaks_at), mixed/point_edges.wgsl (is_beside,
+// point_edges).
 
 @group(1) @binding(22) var<storage, read_write> mixed: array<atomic<u32>>;
 

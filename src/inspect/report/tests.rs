@@ -1,4 +1,5 @@
-//! Figures for printing and of parts, against closed forms.
+//! Tests of the report: walls, overhangs, components, loops and UV charts of shapes whose exact
+//! values follow from formulas.
 
 use serde_json::Value;
 

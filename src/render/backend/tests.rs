@@ -1,19 +1,20 @@
-//! All that the shaders and the code around them must agree on: constants, structs in buffers,
-//! bindings, entry points.
+//! Tests that the shaders and the Rust code beside them agree on constants, structs in buffers,
+//! bindings and entry points.
 //!
-//! WGSL has no include and Rust cannot read it, so both sides write these down. Here the shaders
-//! are parsed and each constant, field and binding is compared; one that neither
+//! WGSL has no include and Rust cannot read it, so both sides write these down. The tests parse the
+//! shaders and compare each constant, field and binding. A constant that neither
 //! [`shared_constants`] nor [`SHADER_ONLY`] lists is a failure too.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
+use std::path::Path;
 
 use wgpu::naga;
 
 use super::cpu::geometry::transform::{GUARD, OUTSIDE, ScreenVertex};
 use super::cpu::geometry::{clip, samples, steepness};
 use super::cpu::lines::holes::{self, inset, tips};
-use super::cpu::lines::{coverage, hidden_lines, profile, segment, sheets, stroke};
+use super::cpu::lines::{coplanar, coverage, hidden_lines, profile, segment, stroke};
 use super::cpu::mixed::find::breaks;
 use super::cpu::mixed::find::look::{self, kinds};
 use super::cpu::mixed::find::thin;
@@ -63,7 +64,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     // Materials: flags, slots, debug views, samplers.
     add_same!("MATERIAL_", flags: FILL FACE_NORMALS DERIVATIVE_NORMALS LIT VERTEX_COLORS MASK BLEND WIRE_BARYCENTRIC
         WIRE_FWIDTH_MIN WIRE_FWIDTH WIRES WIRE_LIT DEBUG_SHIFT OWN_METALLIC OWN_ROUGHNESS BY_ANGLE);
-    add_same!("SLOT_", slots: BASE METALLIC_ROUGHNESS NORMAL EMISSIVE OCCLUSION);
+    add_same!("SLOT_", slots: BASE METALLIC_ROUGHNESS NORMAL EMISSIVE OCCLUSION_TEXTURE);
     add_same!("DEBUG_", debug_views: BARYCENTRIC MIN_BARYCENTRIC EDGE_DISTANCE NORMAL UV FACE_ORIENTATION VERTEX_COLOR);
     add!("JOBS_MAX" = JOBS_MAX);
     add!("WRAP_BITS" = samplers::WRAP_BITS, "WRAP_DOWN_SHIFT" = samplers::DOWN_SHIFT);
@@ -95,7 +96,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("EDGE_ON" = tints::EDGE_ON);
     add!("NEARER_RATIO" = steepness::NEARER_RATIO, "SNAP_ERROR" = hidden_lines::SNAP_ERROR);
     add!("INTERVAL_MIN_PX" = hidden_lines::INTERVAL_MIN_PX, "GAP_MIN_PX" = hidden_lines::GAP_MIN_PX);
-    add!("SIDE_MARGIN" = sheets::SIDE_MARGIN, "IN_PLANE" = sheets::IN_PLANE);
+    add!("SIDE_MARGIN" = coplanar::SIDE_MARGIN, "IN_PLANE" = coplanar::IN_PLANE);
     add!("IDS_MAX" = line_shares::IDS_MAX, "INTERVALS_MAX" = line_shares::INTERVALS_MAX);
     add!("LINE_THREADS" = line_shares::LINE_THREADS);
     add!("GAUSS_PLACE" = profile::GAUSS_PLACE, "GAUSS_OUTER" = profile::GAUSS_OUTER);
@@ -307,7 +308,7 @@ fn layouts() -> Vec<(&'static str, Layout)> {
             "Material",
             layout!(ShadedMaterial {
                 base_color emissive alpha_cutoff wire_color wire_thickness wire_smoothing metallic roughness
-                normal_scale flags opacity facing_opacity occlusion_strength padding_a padding_b padding_c
+                normal_scale flags opacity facing_opacity occlusion_texture_strength padding_a padding_b padding_c
                 textures
             }),
         ),
@@ -432,5 +433,139 @@ fn kernels_have_the_entry_points_and_overrides_that_pipelines_name() {
         declared.sort_unstable();
         given.sort_unstable();
         assert_eq!(declared, given, "{kernel:?}");
+    }
+}
+
+/// Functions of WGSL itself, and its types where they make a value.
+const BUILTINS: &[&str] = &[
+    "abs",
+    "all",
+    "any",
+    "clamp",
+    "countOneBits",
+    "dot",
+    "exp2",
+    "extractBits",
+    "f32",
+    "firstTrailingBit",
+    "floor",
+    "i32",
+    "log2",
+    "max",
+    "min",
+    "select",
+    "sqrt",
+    "storageBarrier",
+    "u32",
+    "u64",
+    "unpack2x16float",
+    "vec2",
+    "vec3",
+    "vec4",
+    "workgroupBarrier",
+    "workgroupUniformLoad",
+];
+
+/// A file of shaders/.
+struct ShaderFile {
+    /// Its text without comments.
+    code: String,
+    /// Its `// Uses:` comment: files, and the names that each group of them defines for this one.
+    uses: Vec<(Vec<String>, Vec<String>)>,
+}
+
+/// The files of a folder and its subfolders, by their path below shaders/.
+fn shader_files(folder: &Path, prefix: &str, files: &mut BTreeMap<String, ShaderFile>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = format!("{prefix}{}", path.file_name().unwrap().to_str().unwrap());
+        if path.is_dir() {
+            shader_files(&path, &format!("{name}/"), files);
+        } else {
+            let text = std::fs::read_to_string(&path).unwrap();
+            let lines = text.lines().map(|line| line.split("//").next().unwrap_or_default());
+            let code = lines.collect::<Vec<_>>().join("\n");
+            files.insert(name.clone(), ShaderFile { code, uses: uses_of(&name, &text) });
+        }
+    }
+}
+
+/// The `// Uses:` comment of a shader: `// Uses: a.wgsl (x, y), b.wgsl or c.wgsl (z).` It may take several lines and
+/// ends with a full stop. `// Uses: nothing.` is the comment of a file that uses no other.
+fn uses_of(name: &str, text: &str) -> Vec<(Vec<String>, Vec<String>)> {
+    let head: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("//")).map(str::trim).collect();
+    let head = head.join(" ");
+    let (_, uses) = head.split_once("Uses: ").unwrap_or_else(|| panic!("{name}: no line `// Uses:`"));
+    let uses = uses.strip_suffix('.').unwrap_or_else(|| panic!("{name}: `// Uses:` is the end of the head comment"));
+    if uses == "nothing" {
+        return Vec::new();
+    }
+    let all = |list: &str, separator: &str| list.split(separator).map(str::to_owned).collect();
+    let groups = uses.strip_suffix(')').unwrap_or_else(|| panic!("{name}: {uses}")).split("), ");
+    let group = |group: &str| {
+        let (files, names) = group.split_once(" (").unwrap_or_else(|| panic!("{name}: {group}"));
+        (all(files, " or "), all(names, ", "))
+    };
+    groups.map(group).collect()
+}
+
+/// The identifiers of some code that are neither fields nor attributes, each with the character after it.
+fn identifiers(code: &str) -> Vec<(&str, char)> {
+    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let mut found = Vec::new();
+    let (mut rest, mut before) = (code, ' ');
+    while let Some(first) = rest.chars().next() {
+        let length = rest.find(|c| !is_word(c)).unwrap_or(rest.len());
+        if length > 0 && !first.is_ascii_digit() && before != '.' && before != '@' {
+            found.push((&rest[..length], rest[length..].chars().next().unwrap_or(' ')));
+        }
+        let (taken, after) = rest.split_at(length.max(first.len_utf8()));
+        (rest, before) = (after, taken.chars().last().unwrap_or(' '));
+    }
+    found
+}
+
+/// The names that code defines outside of functions.
+fn defined_names(code: &str) -> BTreeSet<&str> {
+    let of_line = |line| {
+        let words = identifiers(line);
+        let keyword = words.iter().position(|(word, _)| ["fn", "struct", "const", "override", "var"].contains(word))?;
+        // `var<storage, read> name`: the words in angle brackets are no names.
+        let is_bracketed = |&&(word, _): &&(&str, char)| {
+            ["storage", "uniform", "workgroup", "private", "read", "read_write"].contains(&word)
+        };
+        words[keyword + 1..].iter().find(|word| !is_bracketed(word)).map(|(name, _)| *name)
+    };
+    code.lines().filter(|line| !line.starts_with([' ', '}'])).filter_map(of_line).collect()
+}
+
+#[test]
+fn shaders_say_which_files_they_use() {
+    let mut files = BTreeMap::new();
+    shader_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"), "", &mut files);
+    assert!(files.len() > 60, "{}", files.len());
+    for (name, file) in &files {
+        let own = defined_names(&file.code);
+        let words = identifiers(&file.code);
+        for (others, used) in &file.uses {
+            for other in others {
+                let Some(other_file) = files.get(other) else { panic!("{name} uses {other}, which does not exist") };
+                let defined = defined_names(&other_file.code);
+                for word in used {
+                    assert!(defined.contains(word.as_str()), "{name} uses {word} of {other}, which has no such name");
+                }
+            }
+            for word in used {
+                assert!(words.iter().any(|(other, _)| other == word), "{name} says that it uses {word}, but does not");
+            }
+        }
+        // Functions, and by their capital letters structs and constants. Buffers look like local variables.
+        let is_builtin = |word: &str| BUILTINS.contains(&word) || word.starts_with("atomic");
+        let is_said = |word: &str| file.uses.iter().any(|(_, used)| used.iter().any(|other| other == word));
+        for (word, next) in words {
+            let is_global = next == '(' || word.starts_with(|c: char| c.is_ascii_uppercase());
+            let is_known = own.contains(word) || is_builtin(word) || is_said(word);
+            assert!(!is_global || is_known, "{name} uses {word}: add it to `// Uses:`, with the file that defines it");
+        }
     }
 }

@@ -518,12 +518,12 @@ mod tests {
         let [u, v] = [[3.0, 0.0, -1.0], [2.0, -1.0, 0.0]];
         let at = |a: f32, b: f32| [0, 1, 2].map(|k| a * u[k] + b * v[k]);
         let positions = vec![at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0), at(1.0, 1.0)];
-        let sheet = Shape::new(positions, vec![[0, 1, 2], [1, 2, 3]]);
-        let product = dot(sheet.face_normals[0].map(f64::from), sheet.face_normals[1].map(f64::from));
+        let surface = Shape::new(positions, vec![[0, 1, 2], [1, 2, 3]]);
+        let product = dot(surface.face_normals[0].map(f64::from), surface.face_normals[1].map(f64::from));
         assert!(product < -0.999_999, "{product}");
-        assert_eq!(sheet.creased(180.0).triangles, None);
-        assert!(sheet.creased(179.0).triangles.is_some());
-        assert_eq!(sheet.by_corner([180.0, 179.0]), sheet.by_definition([180.0, 179.0]));
+        assert_eq!(surface.creased(180.0).triangles, None);
+        assert!(surface.creased(179.0).triangles.is_some());
+        assert_eq!(surface.by_corner([180.0, 179.0]), surface.by_definition([180.0, 179.0]));
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub struct MaterialSlot {
     /// Ambient light in red: 1 all of it.
     pub occlusion_texture: Option<TextureRef>,
     /// The share of the occlusion texture's darkness that counts, 0 to 1. None: 1.
-    pub occlusion_strength: Option<f32>,
+    pub occlusion_texture_strength: Option<f32>,
 }
 
 /// The meaning of alpha.

@@ -34,7 +34,7 @@ pub fn angle_weighted(positions: &[[f32; 3]], triangles: &[[u32; 3]], face_norma
         }
     }
     let mut normals: Vec<[f32; 3]> = sums.iter().map(|s| unit(*s).unwrap_or_default()).collect();
-    // Where faces cancel each other, as on the two sides of a sheet, the first face's normal is
+    // Where faces cancel each other, as on the two sides of a plate, the first face's normal is
     // taken.
     for (triangle, face_normal) in triangles.iter().zip(face_normals) {
         for &v in triangle {

@@ -134,7 +134,7 @@ fn material_mask(groups: &MaterialGroups<'_>, material: usize, pass: Option<&Pee
         Fill::Opaque => pass_mask::SURFACE,
         Fill::Transparent => pass_mask::LAYER,
         Fill::None if wire.is_some() => pass_mask::LAYER,
-        Fill::None if groups.needs_occluder() => pass_mask::SURFACE,
+        Fill::None if groups.needs_hiding_surface() => pass_mask::SURFACE,
         Fill::None => 0,
     };
     if pass.is_some_and(|pass| pass.wires_only) && wire.is_some_and(|hidden| hidden != Hidden::Hide) {

@@ -21,7 +21,7 @@ pub struct MaterialGroups<'s> {
     pub styles: Vec<&'s Layers>,
     fills: Vec<Fill>,
     has_fill: bool,
-    needs_occluder: bool,
+    needs_hiding_surface: bool,
     has_ground: bool,
 }
 
@@ -56,9 +56,9 @@ impl<'s> MaterialGroups<'s> {
         let fills: Vec<Fill> =
             by_material.iter().zip(&mesh.materials).map(|(layers, slot)| fill(layers, slot)).collect();
         let has_fill = fills.iter().any(|fill| *fill != Fill::None);
-        let needs_occluder = !has_fill && styles.iter().any(|layers| has_hideable_lines(layers));
+        let needs_hiding_surface = !has_fill && styles.iter().any(|layers| has_hideable_lines(layers));
         let has_ground = has_fill && spec.ground != Ground::None;
-        Self { by_material, style_of, styles, fills, has_fill, needs_occluder, has_ground }
+        Self { by_material, style_of, styles, fills, has_fill, needs_hiding_surface, has_ground }
     }
 
     /// Number of materials.
@@ -112,13 +112,13 @@ impl<'s> MaterialGroups<'s> {
     }
 
     /// True if lines need an invisible surface that only hides them.
-    pub fn needs_occluder(&self) -> bool {
-        self.needs_occluder
+    pub fn needs_hiding_surface(&self) -> bool {
+        self.needs_hiding_surface
     }
 
     /// True if there is a surface that hides lines, visible or not.
     pub fn hides_lines(&self) -> bool {
-        self.has_fill || self.needs_occluder
+        self.has_fill || self.needs_hiding_surface
     }
 
     /// The side that all materials leave out; none where they differ.

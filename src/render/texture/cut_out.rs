@@ -1,9 +1,13 @@
-//! Cut-out textures: the distance of each texel from the border between what is drawn and what is left out.
+//! Cut-out textures: the distance of each texel from the border between what is drawn and what is
+//! left out.
 //!
-//! A picture shows the share of each pixel that is drawn. From near, where texels are larger than pixels, that follows
-//! from the distance to the border and the size of the pixel. From afar it is the mean of the texels' own shares, which
-//! coarser levels hold. The mean of alphas says neither: its contrast falls from level to level, so that leaves and
-//! lattices would vanish, or close up.
+//! Only texels whose alpha reaches the material's cutoff are drawn, such as those of a leaf. A
+//! pixel's coverage is the share of it that is drawn. If texels are larger than pixels, this share
+//! follows from the distance to the border and the size of the pixel. If texels are smaller, it is
+//! the mean of the texels' coverages, which the mip levels hold.
+//!
+//! The levels do not hold the mean of alpha, because its contrast falls from level to level: leaves
+//! and lattices would vanish, or close up.
 
 use rayon::prelude::*;
 

@@ -13,7 +13,7 @@ use bytes::Bytes;
 /// Bytes of a record, of which 36 are corners.
 const RECORD_BYTES: usize = 41;
 
-/// A bumpy sheet of `side` by `side` squares; some of its triangles have a NaN, no area, or only
+/// A bumpy open surface of `side` by `side` squares; some of its triangles have a NaN, no area, or only
 /// one that rounding takes away. Bad ones are left out if `odd` is 0.
 fn corners(side: u32, odd: u32) -> Vec<[f32; 9]> {
     let at = |x: u32, y: u32| [x as f32, y as f32, (x * y % 5) as f32 - 0.0];

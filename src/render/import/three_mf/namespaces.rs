@@ -1,4 +1,5 @@
-//! XML namespaces: the owner of each element, and the extensions that a part requires.
+//! XML namespaces of 3MF files: the specification that each element belongs to, and the extensions
+//! that a file requires of its readers.
 
 use crate::import::text;
 use quick_xml::events::BytesStart;

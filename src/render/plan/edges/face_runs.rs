@@ -1,8 +1,9 @@
-//! Runs of faces: a box around each, and a cone of its normals. A view can then tell of most runs at once
-//! where they lie on screen and which side they show.
+//! Runs of 32 consecutive faces of a mesh, each with a bounding box and a cone that contains its
+//! normals. From these a view decides for a whole run whether it is in the picture and whether it
+//! faces the viewer.
 //!
-//! Faces that follow each other in a mesh are mostly neighbours. Where they are not, boxes and cones are wide
-//! and tell nothing.
+//! Consecutive faces are mostly neighbours. If they are not, the box and the cone are wide, and the
+//! view has to look at each face.
 
 use std::ops::Range;
 

@@ -7,13 +7,13 @@
 
 pub(crate) mod build;
 pub(crate) mod chains;
+pub(crate) mod hidden_directions;
 mod outer_side;
 pub(crate) mod parts;
 pub(crate) mod round_join;
 pub(crate) mod screen_edges;
 pub(crate) mod silhouette_edges;
 mod sort;
-pub(crate) mod vertex_occlusion;
 pub(crate) mod visible_parts;
 
 pub use build::hull_pass;

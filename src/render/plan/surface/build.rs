@@ -28,7 +28,7 @@ pub fn surface_pass<'m>(
 ) -> Result<Option<SurfacePass<'m>>, PlanError> {
     let groups = &scene.groups;
     let is_seen = groups.has_fill() || groups.has_barycentric_wire();
-    let is_needless = !is_seen && !groups.needs_occluder();
+    let is_needless = !is_seen && !groups.needs_hiding_surface();
     let why = "the look has no filled surface, and no line that one could hide";
     if cx.skips.skip(SkipKind::Surface, is_needless, why) {
         return Ok(None);

@@ -93,7 +93,7 @@ fn fill(material: &mut ShadedMaterial, mesh: &Mesh, slot: &MaterialSlot, surface
     material.metallic = surface.metallic.or(slot.metallic).unwrap_or(0.0);
     material.roughness = surface.roughness.or(slot.roughness).unwrap_or(DEFAULT_ROUGHNESS);
     material.normal_scale = slot.normal_scale.unwrap_or(1.0);
-    material.occlusion_strength = slot.occlusion_strength.unwrap_or(1.0);
+    material.occlusion_texture_strength = slot.occlusion_texture_strength.unwrap_or(1.0);
     material.emissive = match surface.emissive {
         Some(Rgba([r, g, b, a])) => [r, g, b].map(|v| v * a),
         None => slot.emissive.unwrap_or_default(),
@@ -164,7 +164,7 @@ fn sample(
         // The other kinds of normals show the faces as they are.
         (slots::NORMAL, material.flags & flags::VERTEX_NORMALS != 0, &slot.normal_texture, false),
         (slots::EMISSIVE, surface.emissive.is_none() && material.emissive != [0.0; 3], &slot.emissive_texture, true),
-        (slots::OCCLUSION, is_lit && material.occlusion_strength > 0.0, &slot.occlusion_texture, false),
+        (slots::OCCLUSION_TEXTURE, is_lit && material.occlusion_texture_strength > 0.0, &slot.occlusion_texture, false),
     ];
     for (place, is_needed, texture, is_color) in wanted {
         if let Some(texture) = texture.as_ref().filter(|_| is_needed) {

@@ -85,7 +85,7 @@ pub struct ShadedMaterial {
     /// For [`flags::BY_ANGLE`]: the share of alpha that is left where the surface faces the viewer.
     pub facing_opacity: f32,
     /// The share of the occlusion texture's darkness that counts, 0 to 1.
-    pub occlusion_strength: f32,
+    pub occlusion_texture_strength: f32,
     /// Always 0.
     pub padding_a: u32,
     /// Always 0.
@@ -121,8 +121,8 @@ pub mod slots {
     pub const NORMAL: usize = 2;
     /// Emitted light.
     pub const EMISSIVE: usize = 3;
-    /// Ambient light in red.
-    pub const OCCLUSION: usize = 4;
+    /// The occlusion texture: the share of ambient light that is left, in red.
+    pub const OCCLUSION_TEXTURE: usize = 4;
     /// Number of places.
     pub const COUNT: usize = 5;
 }
@@ -266,7 +266,7 @@ impl ShadedMaterial {
             flags: flags::FILL,
             opacity: 1.0,
             facing_opacity: 1.0,
-            occlusion_strength: 1.0,
+            occlusion_texture_strength: 1.0,
             padding_a: 0,
             padding_b: 0,
             padding_c: 0,

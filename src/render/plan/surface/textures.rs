@@ -1,5 +1,5 @@
-//! Images to textures: decoded only if sampled, once per way of reading them, and only as large as
-//! the picture can show.
+//! Loads the images that materials sample. An image is decoded only if it is sampled, once per way
+//! of reading its texels, and only to the size that the picture can show.
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;

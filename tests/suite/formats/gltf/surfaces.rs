@@ -78,7 +78,7 @@ fn textures_samplers_and_transforms() {
     assert_eq!((base.image, base.wrap, base.nearest), (0, [Wrap::Clamp, Wrap::Mirror], true));
     assert_eq!(slot.metallic_roughness_texture, Some(TextureRef::new(1)), "repeated and smooth by default");
     assert_eq!((slot.normal_texture, slot.normal_scale), (Some(TextureRef::new(1)), Some(0.5)));
-    assert_eq!((slot.occlusion_texture, slot.occlusion_strength), (Some(TextureRef::new(1)), Some(1.0)));
+    assert_eq!((slot.occlusion_texture, slot.occlusion_texture_strength), (Some(TextureRef::new(1)), Some(1.0)));
     let apart = surface(json!({
         "pbrMetallicRoughness": { "baseColorTexture": { "index": 1 } },
         "occlusionTexture": { "index": 0, "texCoord": 1 },

@@ -324,7 +324,7 @@ fn uses_are_written_as_the_shaders_read_them() {
     let surface = plan.surface.unwrap();
     let uses = surface.materials[0].textures;
     assert_eq!(uses.map(|u| u.texture), [0, TEXTURE_NONE, 1, 0, 1], "once as colour and once as data");
-    assert_eq!(surface.materials[0].occlusion_strength, 0.25);
+    assert_eq!(surface.materials[0].occlusion_texture_strength, 0.25);
     assert_eq!(uses[slots::BASE].transform, [[2.0, 0.0, 0.25], [0.0, 3.0, 0.5]]);
     assert_eq!((uses[slots::BASE].sampler, surface.textures.images.len()), (0, 2));
     // Without texture coordinates there is nothing to sample with.

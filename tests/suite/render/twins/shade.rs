@@ -66,7 +66,7 @@ const LOOKS: &[Look] = &[
     }),
     ("texture of the second coordinates", |m| {
         (m.flags, m.textures[slots::BASE]) = (SMOOTH, used(CHECKER, SECOND));
-        (m.textures[slots::NORMAL], m.textures[slots::OCCLUSION]) = (used(BUMPS, 0), used(CHECKER, 0));
+        (m.textures[slots::NORMAL], m.textures[slots::OCCLUSION_TEXTURE]) = (used(BUMPS, 0), used(CHECKER, 0));
     }),
     ("normal texture of the second coordinates", |m| {
         (m.flags, m.textures[slots::NORMAL]) = (SMOOTH, used(BUMPS, SECOND));

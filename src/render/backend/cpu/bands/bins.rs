@@ -1,4 +1,4 @@
-//! Sorting of triangles and edges into bands of rows, before the stage visibility.
+//! Sorting of triangles and edges into bands of rows, before stage visibility.
 
 use std::ops::Range;
 use std::sync::OnceLock;

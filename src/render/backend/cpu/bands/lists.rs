@@ -1,4 +1,8 @@
-//! Lists of triangles per band of rows, sorted by counting.
+//! Lists of the triangles that touch each band. A band is a range of pixel rows that one thread
+//! draws at a time.
+//!
+//! The lists of all bands lie one after the other in one array, which a counting sort fills.
+//! Triangles that touch many bands are in a list of their own, which every band filters.
 
 use std::ops::Range;
 
@@ -14,7 +18,7 @@ pub struct KeptFaces {
     pub ids: Vec<u32>,
     /// First and last band, as a [`pair`].
     pub spans: Vec<u32>,
-    /// The triangles with their boxes; empty for those whose boxes nobody asks for.
+    /// The triangles with their boxes; empty for lists of ids alone.
     pub boxed: Vec<BoxedFace>,
 }
 
@@ -60,14 +64,14 @@ pub struct BandLists {
     /// The items, as ids or with boxes.
     ids: Vec<u32>,
     boxed: Vec<BoxedFace>,
-    /// Triangles that touch many bands, and which ones.
+    /// Triangles that touch many bands, each with its first and last band as a [`pair`].
     tall: Vec<(BoxedFace, u32)>,
-    /// Every triangle's id once, in ascending order, for lists of which that is asked.
+    /// Every triangle's id once, in ascending order.
     pub all: Vec<u32>,
 }
 
 impl BandLists {
-    /// Sorts triangles.
+    /// Sorts the triangles by band.
     pub fn new(kept: KeptFaces, bands: usize) -> Self {
         let mut lists = Self::default();
         for (i, &span) in kept.spans.iter().enumerate().filter(|(_, span)| is_tall(**span)) {
@@ -84,15 +88,15 @@ impl BandLists {
         lists
     }
 
-    /// Ids of the band's triangles: of some in the list itself, and of others.
+    /// Ids of the band's triangles. The second list has the tall ones, and all of a list with boxes.
     pub fn items_in(&self, band: usize) -> (&[u32], Vec<u32>) {
         let (boxed, tall) = self.boxed_in(band);
         let others = boxed.iter().chain(&tall).map(|face| face.id).collect();
         (self.ids.get(self.range_of(band)).unwrap_or_default(), others)
     }
 
-    /// The band's triangles with their boxes, for lists that have them: those in few bands, and
-    /// others.
+    /// The band's triangles with their boxes, for lists that have boxes. The second list has the tall
+    /// ones.
     pub fn boxed_in(&self, band: usize) -> (&[BoxedFace], Vec<BoxedFace>) {
         let is_here = |span: u32| (bands_of(span)[0]..=bands_of(span)[1]).contains(&band);
         let tall = self.tall.iter().filter(|(_, span)| is_here(*span)).map(|(face, _)| *face).collect();
@@ -121,8 +125,11 @@ fn is_tall(span: u32) -> bool {
     last - first >= TALL_BANDS
 }
 
-/// A number per band, and one that nothing reads: most triangles touch one band. Which ones touch
-/// two is hard to predict, so all are counted twice, the second time perhaps in vain.
+/// A number per band, and one more that is never read.
+///
+/// Most triangles touch one band, some two. A branch between these cases would often be mispredicted.
+/// So each triangle is counted twice: the second time in its last band, or in the number that is
+/// never read.
 struct PerBand(Vec<u32>);
 
 impl PerBand {
@@ -149,8 +156,9 @@ impl PerBand {
     }
 }
 
-/// Calls `each` with 0 or 1 and an index of so many: 0 for the first half, 1 for the second, in
-/// turns. What it adds to numbers of the two halves need not wait for each other.
+/// Calls `each` for each index below `len`, in turns for one of the first half and one of the second.
+/// The first argument is the half, 0 or 1. If each half has its own numbers, additions of the two do
+/// not wait for each other.
 #[inline(always)]
 fn in_halves(len: usize, mut each: impl FnMut(usize, usize)) {
     let half = len / 2;
@@ -163,7 +171,7 @@ fn in_halves(len: usize, mut each: impl FnMut(usize, usize)) {
     }
 }
 
-/// The items of each band, and where each band's begin.
+/// The items sorted by band, and the index of each band's first item.
 fn sorted<T: Copy + Default>(items: &[T], spans: &[u32], bands: usize) -> (Vec<T>, Vec<u32>) {
     let mut counts = [PerBand::zeros(bands), PerBand::zeros(bands)];
     in_halves(spans.len(), |half, i| {

@@ -1,4 +1,5 @@
-//! Sizes of bands, and their buffers.
+//! The height of bands, which follows from the memory that a band may take, and the buffers that a
+//! thread draws a band in.
 
 use std::sync::{Mutex, PoisonError};
 

@@ -1,5 +1,5 @@
-//! Stage visibility: the innermost steps of `batch` in AVX-512 instructions, sixteen samples at a time,
-//! each as the eight of `batch_avx2`.
+//! Stage visibility: the inner loop of `batch` in AVX-512 instructions. It takes sixteen samples at
+//! a time. Each has the same result as in `batch_avx2`, which takes eight.
 
 #![allow(unsafe_code)]
 

@@ -1,5 +1,5 @@
-//! Stage transform, per triangle that reaches behind the eye or far outside the picture: clipping.
-//! Twin of `shaders/geometry/clip.wgsl`.
+//! Stage transform, per triangle: clipping of triangles that reach behind the eye or far outside
+//! the picture. Twin of `shaders/geometry/clip.wgsl`.
 
 use super::transform::{ScreenVertex, recip, round_to_i32};
 use crate::plan::Projection;

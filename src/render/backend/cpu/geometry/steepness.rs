@@ -1,6 +1,5 @@
-//! Depths that are compared: what rounding does to them, the slope of a triangle's depth on screen, and the areas
-//! that its sides span with a point: weights of its corners' depths.
-//! Twin of `shaders/geometry/steepness.wgsl`.
+//! Comparisons of depths: the tolerance for rounding, and the slope of a triangle's depth on
+//! screen. Twin of `shaders/geometry/steepness.wgsl`.
 
 use super::transform::{ScreenVertex, homogeneous, recip};
 use crate::backend::cpu::RasterContext;

@@ -1,8 +1,8 @@
-//! Stage lines, per edge: the triangles that may hide it, eight at a time.
+//! Stage lines, per edge: selects the triangles that may hide the edge, eight at a time.
 //!
-//! Most triangles along an edge hide nothing of it: they have the edge, lie beside it, or farther
-//! away. That is decided for eight of them at once, by the operations of
-//! [`hidden_by`](super::hidden_lines) up to there; the few that are left are examined one by one.
+//! Most triangles along an edge hide nothing of it: the edge is one of their sides, or they lie
+//! beside it or behind it. These are rejected here, by the same operations as at the start of
+//! [`hidden_by`](super::hidden_lines). The few that remain are tested one by one.
 
 use super::segment::Segment;
 use crate::backend::cpu::RasterContext;

@@ -1,5 +1,6 @@
-//! Stage lines, per edge: selects silhouettes and removes edges of faces that face away. Twin of
-//! `shaders/lines/contour.wgsl`.
+//! Stage lines, per edge: decides whether the edge is drawn in this view. A pass of contours keeps
+//! only silhouettes, and on closed surfaces an edge is dropped if all its faces face away from the
+//! viewer. Twin of `shaders/lines/contour.wgsl`.
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous};

@@ -1,10 +1,13 @@
-//! Stage lines, per pixel: the union of its strokes, composited over the colours. Twin of
-//! `shaders/lines/coverage.wgsl`.
+//! Stage lines, per pixel: the coverage by the union of all strokes, and the lines' colour
+//! composited over the pixel. Twin of `shaders/lines/coverage.wgsl`.
 //!
-//! Four integers describe all strokes of a pixel, so that their order does not matter: the sum of
-//! areas, the sum of point counts, the mask of points that any stroke covers, and the largest
-//! difference between an area and its points. Where they do not overlap the sum of the areas is the
-//! answer; where they do, the share of the points that are left of the sum says how much of it is
+//! A stroke is what one edge's line covers. Four integers per pixel describe all its strokes: the
+//! sum of their areas, the sum of the numbers of coverage points in them, the mask of the points
+//! that any of them covers, and the largest difference between a stroke's area and its points.
+//! Integers can be summed in any order, so the result does not depend on the order of the strokes.
+//!
+//! If strokes do not overlap, the coverage is the sum of their areas. If they overlap, the sum is
+//! scaled by the number of points that any stroke covers over the sum of the strokes' points
 //! ([`LineCoverage::covered_share`]).
 
 use super::holes::Holes;

@@ -7,9 +7,9 @@
 
 use super::candidates::Candidates;
 use super::contour::volume;
+use super::coplanar::HidingTriangle;
 use super::farthest::Farthest;
 use super::segment::Segment;
-use super::sheets::Sheet;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::is_moderate;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
@@ -272,8 +272,8 @@ pub(super) fn hidden_by(context: &RasterContext<'_>, edge: &Edge, segment: &Segm
         if perhaps_by[0].max(perhaps_by[1]) <= 0.0 {
             return None;
         }
-        let sheet = Sheet { id, corners, is_clockwise, slack };
-        if sheet.has_beneath(context, edge, weights(&sides, 0.5 * (range[0] + range[1]))) {
+        let triangle = HidingTriangle { id, corners, is_clockwise, slack };
+        if triangle.has_beneath(context, edge, weights(&sides, 0.5 * (range[0] + range[1]))) {
             nearer_by = perhaps_by;
         }
     }

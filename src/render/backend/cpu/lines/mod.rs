@@ -11,6 +11,7 @@
 
 pub(crate) mod candidates;
 pub(crate) mod contour;
+pub(crate) mod coplanar;
 pub(crate) mod coverage;
 pub(crate) mod edge;
 pub(crate) mod farthest;
@@ -20,5 +21,4 @@ pub(crate) mod line_light;
 pub(crate) mod plain;
 pub(crate) mod profile;
 pub(crate) mod segment;
-pub(crate) mod sheets;
 pub(crate) mod stroke;

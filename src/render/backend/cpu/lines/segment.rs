@@ -1,4 +1,4 @@
-//! Stage lines, per edge: its position on screen and the pixels along it. Twin of
+//! Stage lines, per edge: the edge's ends on screen, and the walk over the pixels along it. Twin of
 //! `shaders/lines/segment.wgsl`.
 
 use crate::backend::cpu::RasterContext;

@@ -1,5 +1,8 @@
-//! Stage mixed, per pixel: its colour by what its points see. Each triangle is shaded once, at the mean of its points, and
-//! weighs its share of them; once in each quarter of the pixel, where it is of a metal that mirrors sharply.
+//! Stage mixed, per pixel: the colour of a pixel from the faces that its points see.
+//!
+//! Each visible triangle is shaded once, at the mean position of its points. Its colour weighs as
+//! much as its share of the points. A triangle of a metal that mirrors sharply is shaded once in
+//! each quarter of the pixel.
 
 use std::ops::ControlFlow;
 

@@ -1,4 +1,7 @@
-//! Stage mixed, per band: draws the mixed pixels of a band once more.
+//! Stage mixed, per band: finds the band's mixed pixels and computes their colours.
+//!
+//! A mixed pixel is one in which faces of different colours meet. The few samples that all pixels
+//! have are not enough there. So its colour is computed once more, from 64 or 256 points.
 
 use super::band_triangles::BandTriangles;
 use super::color::{Found, color};
@@ -17,12 +20,12 @@ pub struct MixedScratch {
     /// The band's mixed pixels.
     pub pixels: MixedPixels,
     finder: Finder,
-    /// The triangles that some of them may show.
+    /// The triangles that each mixed pixel of the current batch may show.
     lists: PixelLists,
     recent: Recent,
-    /// The colours of some of them.
+    /// The colours of that batch.
     found: Found,
-    /// The points that see something in pixels at the border of all faces, for lines over them.
+    /// The points that see something, for pixels in which others see nothing. Lines need them.
     pub border: BorderPoints,
 }
 
@@ -77,7 +80,7 @@ pub fn draw_mixed(
         fill(context.isa, context, &triangles, pixels, samples, lists);
         match lists.end {
             ListsEnd::Expired => return,
-            // One pixel goes without a list where it is too long.
+            // Fewer pixels fit. A single one whose list is too long is drawn without a list.
             ListsEnd::Full if end - first > 1 => {
                 at_once = (end - first).div_ceil(4);
                 continue;
@@ -95,7 +98,7 @@ pub fn draw_mixed(
             }
         }
         first = end;
-        // The pixels after a crowded one need not be crowded.
+        // Pixels after one with many triangles may have few.
         at_once = (2 * at_once).min(PIXELS_MAX);
     }
 }

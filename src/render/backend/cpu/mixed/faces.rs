@@ -1,7 +1,9 @@
-//! Stage mixed, per pixel: the faces that its points see, as a set of points for each.
+//! Stage mixed, per pixel: the faces that are visible in the pixel, each with the set of the
+//! pixel's points at which it is the nearest.
 //!
-//! Depths are compared for whole faces where one lies in front of the other all over the pixel, and point by point
-//! elsewhere. The result is that of [`crowd`](super::crowd), point for point.
+//! Faces are added one by one. Two faces are compared once if the depth ranges that they have in
+//! the pixel do not overlap, and point by point otherwise. A pixel has at most 16 faces here;
+//! [`crowd`](super::crowd) takes pixels with more, and has the same result.
 
 use super::points::PointSet;
 use super::shares::{Share, Shares};
@@ -31,7 +33,7 @@ pub struct Face<const W: usize> {
     pub points: PointSet<W>,
     /// Its depth in the pixel.
     pub plane: Plane,
-    /// Between these all its depths are.
+    /// Least and greatest depth in the pixel.
     extremes: [f32; 2],
 }
 

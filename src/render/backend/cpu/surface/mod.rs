@@ -3,7 +3,7 @@
 //! [`together`] groups a pixel's samples by triangle, eight pixels at a time, and [`shade`] those of a pixel by itself.
 //! [`point`] shades each group once, at the mean of its samples; groups of a band are [`waiting`] until many are
 //! shaded together. The rest is its formulas: [`barycentric`] coordinates, [`texture`] lookups, the [`normal`],
-//! [`light`], [`occlusion`], [`wire`] and [`debug`] views. Twins are in `shaders/surface/`.
+//! [`light`], [`occlusion_texture`], [`wire`] and [`debug`] views. Twins are in `shaders/surface/`.
 
 pub(crate) mod barycentric;
 pub(crate) mod debug;
@@ -12,7 +12,7 @@ pub(crate) mod flat;
 mod flat_avx2;
 pub(crate) mod light;
 pub(crate) mod normal;
-mod occlusion;
+mod occlusion_texture;
 pub(crate) mod point;
 pub(crate) mod shade;
 pub(crate) mod texture;

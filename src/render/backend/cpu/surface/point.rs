@@ -5,7 +5,7 @@ use super::barycentric::{Barycentrics, Corners};
 use super::debug;
 use super::light::{Light, LightLanes, light_lanes, lit_lanes, unlit_lanes};
 use super::normal::{angle_shares, face_normals, normal_mapped, normals, to_viewer};
-use super::occlusion::occlude;
+use super::occlusion_texture::apply_occlusion_texture;
 use super::texture::{Uv, blend, of_corners, sample, uv_corners};
 use super::wire::{Place, edge_mask, fwidth_covers, wire_covers};
 use crate::backend::cpu::RasterContext;
@@ -201,9 +201,9 @@ impl Points<'_> {
             let roughness = own(flags::OWN_ROUGHNESS, material.roughness, roughness);
             let projection = &context.plan.projection;
             light = light_lanes(quick_recip, &surface.lights, projection, &metallic, &roughness, &normal);
-            if is_textured && self.has_texture(slots::OCCLUSION) {
-                let red = (material.occlusion_strength, &texels[slots::OCCLUSION][0]);
-                occlude(&mut light, (&surface.lights, projection), red, &metallic, &normal);
+            if is_textured && self.has_texture(slots::OCCLUSION_TEXTURE) {
+                let red = (material.occlusion_texture_strength, &texels[slots::OCCLUSION_TEXTURE][0]);
+                apply_occlusion_texture(&mut light, (&surface.lights, projection), red, &metallic, &normal);
             }
             light = light.dimmed(open);
         }
@@ -293,7 +293,7 @@ impl Points<'_> {
         let share = self.footprint();
         let first = Uv::new(&of_corners(uvs, &place.ids), &place.b).narrowed(share);
         for (slot, texels) in texels.iter_mut().enumerate() {
-            let is_light = [slots::METALLIC_ROUGHNESS, slots::NORMAL, slots::OCCLUSION].contains(&slot);
+            let is_light = [slots::METALLIC_ROUGHNESS, slots::NORMAL, slots::OCCLUSION_TEXTURE].contains(&slot);
             if self.has_texture(slot) && (!is_light || self.material.flags & flags::LIT != 0) {
                 let (textures, used) = (&self.surface.textures, &self.material.textures[slot]);
                 let uv = if used.sampler & samplers::SECOND_UVS == 0 {

@@ -8,7 +8,7 @@ const ONE_JOB: &str = include_str!("../../../shaders/one_job.wgsl");
 const GANG: &str = include_str!("../../../shaders/gang.wgsl");
 const CONTOUR: &str = include_str!("../../../shaders/lines/contour.wgsl");
 const HIDDEN_LINES: &str = include_str!("../../../shaders/lines/hidden_lines.wgsl");
-const SHEETS: &str = include_str!("../../../shaders/lines/sheets.wgsl");
+const COPLANAR: &str = include_str!("../../../shaders/lines/coplanar.wgsl");
 const INSET: &str = include_str!("../../../shaders/lines/holes/inset.wgsl");
 const MARKS: &str = include_str!("../../../shaders/lines/holes/marks.wgsl");
 const SEEN: &str = include_str!("../../../shaders/lines/seen.wgsl");
@@ -56,7 +56,7 @@ const SHADE: &[&str] = &[
     include_str!("../../../shaders/surface/barycentric.wgsl"),
     include_str!("../../../shaders/surface/texture.wgsl"),
     include_str!("../../../shaders/surface/light.wgsl"),
-    include_str!("../../../shaders/surface/occlusion.wgsl"),
+    include_str!("../../../shaders/surface/occlusion_texture.wgsl"),
     include_str!("../../../shaders/surface/wire.wgsl"),
     include_str!("../../../shaders/surface/normal.wgsl"),
     include_str!("../../../shaders/surface/debug.wgsl"),
@@ -192,7 +192,7 @@ impl Kernel {
                     SEGMENT,
                     SEEN,
                     HIDDEN_LINES,
-                    SHEETS,
+                    COPLANAR,
                     STROKE_WORDS,
                     LATTICE,
                     STROKE,

@@ -124,7 +124,7 @@ impl Textures<'_, '_, '_, '_> {
         slot.normal_scale = json.normal_texture.as_ref().and_then(|t| t.scale).map(|s| s.clamp(-1e4, 1e4) as f32);
         slot.emissive_texture = self.texture(&json.emissive_texture)?;
         slot.occlusion_texture = self.occlusion_texture(&json.occlusion_texture)?;
-        slot.occlusion_strength = json.occlusion_texture.as_ref().and_then(|t| t.strength).map(share);
+        slot.occlusion_texture_strength = json.occlusion_texture.as_ref().and_then(|t| t.strength).map(share);
         let strength = self.extension::<EmissiveStrength>(json, "KHR_materials_emissive_strength")?;
         let strength = strength.and_then(|s| s.emissive_strength).unwrap_or(1.0);
         slot.emissive = json.emissive_factor.map(|rgb| rgb.map(|v| (v * strength).clamp(0.0, BRIGHTEST) as f32));

@@ -1,5 +1,5 @@
 //! Width and opacity of lines that mark open edges: thinner and fainter where they would cover most
-//! of the surface, as on models that are put together from many sheets.
+//! of the surface, as on models that are put together from many open surfaces.
 
 use super::{AutoWidth, STEPS, View};
 use crate::limits::{Deadline, Stopped};

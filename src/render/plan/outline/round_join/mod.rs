@@ -7,9 +7,9 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 use crate::limits::{Budget, Deadline, Stopped};
 use crate::plan::PlanError;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
+use crate::plan::outline::hidden_directions::{HiddenDirections, wrapped};
 use crate::plan::outline::silhouette_edges::ScreenMesh;
 use crate::plan::outline::sort::sort;
-use crate::plan::outline::vertex_occlusion::{VertexOcclusion, wrapped};
 use crate::plan::outline::{EdgeEnd, HullPass, HullVertex};
 
 /// Largest distance of an arc from its chords, 1/256 px: 1/64 px.
@@ -71,8 +71,8 @@ impl RoundJoins {
         cx: &mut PlanContext<'_>,
     ) -> Result<(), PlanError> {
         self.sort(cx.deadline)?;
-        let occlusion = VertexOcclusion::around(&mut self.ends, view, cx)?;
-        self.draw(&occlusion, first, hull, cx)
+        let hidden = HiddenDirections::around(&mut self.ends, view, cx)?;
+        self.draw(&hidden, first, hull, cx)
     }
 
     /// Puts the ends in order, by vertex and angle.
@@ -88,17 +88,17 @@ impl RoundJoins {
     /// Adds the joins; the hull's own vertices are numbered from `first` on.
     fn draw(
         &self,
-        occlusion: &VertexOcclusion,
+        hidden: &HiddenDirections,
         first: u32,
         hull: &mut HullPass<'_>,
         cx: &mut PlanContext<'_>,
     ) -> Result<(), PlanError> {
         let (ends, deadline) = (&self.ends, cx.deadline);
         let mut steps = 0.0;
-        each_join(ends, occlusion, deadline, |join| steps += join.angle() / step(ends, &join))?;
+        each_join(ends, hidden, deadline, |join| steps += join.angle() / step(ends, &join))?;
         let coarser = (steps / self.triangles_max).max(1.0);
         let (mut vertices, mut triangles) = (0, 0);
-        each_join(ends, occlusion, deadline, |join| {
+        each_join(ends, hidden, deadline, |join| {
             let count = chords(ends, &join, coarser) as usize;
             triangles += count;
             vertices += count + 1 - usize::from(join.begins(ends).is_some()) - usize::from(join.meets(ends).is_some());
@@ -106,7 +106,7 @@ impl RoundJoins {
         grow("an outline's corners", &mut hull.vertices, vertices, cx.budget)?;
         grow("an outline's corners", &mut hull.triangles, triangles, cx.budget)?;
         grow("an outline's corners", &mut hull.triangle_materials, triangles, cx.budget)?;
-        each_join(ends, occlusion, deadline, |join| draw(ends, &join, coarser, first, hull))?;
+        each_join(ends, hidden, deadline, |join| draw(ends, &join, coarser, first, hull))?;
         Ok(())
     }
 }
@@ -140,7 +140,7 @@ impl Join {
 /// Calls `each` with every piece of a join, vertex by vertex.
 fn each_join(
     ends: &[EdgeEnd],
-    occlusion: &VertexOcclusion,
+    hidden: &HiddenDirections,
     deadline: &Deadline,
     mut each: impl FnMut(Join),
 ) -> Result<(), Stopped> {
@@ -158,7 +158,7 @@ fn each_join(
         let EdgeEnd { vertex, free, angle, turn, .. } = ends[from];
         let (start, free) = (angle + f64::from(free) * turn, f64::from(free));
         let low = wrapped(if free > 0.0 { start } else { start - sweep });
-        occlusion.gaps(vertex, [low, low + sweep], |[a, b]| {
+        hidden.gaps(vertex, [low, low + sweep], |[a, b]| {
             let [a, b] = if free > 0.0 { [a - low, b - low] } else { [low + sweep - b, low + sweep - a] };
             // Slivers that rounding leaves beside a face are not drawn.
             let piece = [if a < PIECE_MIN { 0.0 } else { a }, if b > sweep - PIECE_MIN { sweep } else { b }];

@@ -35,7 +35,7 @@ fn finish(ends: Vec<EdgeEnd>, size_px: [u32; 2]) -> (HullPass<'static>, Result<(
     let mut joins = joins(ends, size_px);
     joins.sort(&deadline).unwrap();
     let mut cx = PlanContext::new(&mut budget, &deadline, &[]);
-    let result = joins.draw(&VertexOcclusion::default(), 10, &mut hull, &mut cx);
+    let result = joins.draw(&HiddenDirections::default(), 10, &mut hull, &mut cx);
     let exact = [hull.vertices.capacity(), hull.triangles.capacity()];
     assert_eq!(exact, [hull.vertices.len(), hull.triangles.len()], "room for what there is");
     (hull, result)
@@ -46,7 +46,7 @@ fn swept(ends: Vec<EdgeEnd>) -> f64 {
     let mut joins = joins(ends, SIZE_PX);
     let (mut sum, deadline) = (0.0, Deadline::default());
     joins.sort(&deadline).unwrap();
-    each_join(&joins.ends, &VertexOcclusion::default(), &deadline, |join| sum += join.angle()).unwrap();
+    each_join(&joins.ends, &HiddenDirections::default(), &deadline, |join| sum += join.angle()).unwrap();
     sum
 }
 
@@ -72,7 +72,7 @@ fn joins_fill_what_offset_quads_leave() {
 /// two edges is hidden.
 #[test]
 fn faces_cut_joins_beside_edges_that_they_hide() {
-    let occlusion = VertexOcclusion::of_one(0, [FRAC_PI_2 + 0.2, PI - 0.3]);
+    let hidden = HiddenDirections::of_one(0, [FRAC_PI_2 + 0.2, PI - 0.3]);
     let deadline = Deadline::default();
     for (is_hidden, want) in
         [([false, false], vec![FRAC_PI_2]), ([true, false], vec![0.2, 0.3]), ([false, true], vec![0.2, 0.3])]
@@ -80,7 +80,7 @@ fn faces_cut_joins_beside_edges_that_they_hide() {
         let mut ends = corner(0, [0.0, 1.5 * PI], 4.0);
         (0..2).for_each(|k| ends[k].is_hidden = is_hidden[k]);
         let mut angles = Vec::new();
-        each_join(&ends, &occlusion, &deadline, |join| angles.push(join.angle())).unwrap();
+        each_join(&ends, &hidden, &deadline, |join| angles.push(join.angle())).unwrap();
         let is_near = angles.len() == want.len() && angles.iter().zip(&want).all(|(a, b)| (a - b).abs() < 1e-6);
         assert!(is_near, "{angles:?}, not {want:?}");
     }
@@ -109,7 +109,7 @@ fn joins_end_when_the_job_does() {
     let (mut hull, mut budget, deadline) = (HullPass::default(), Budget::new(&Limits::default()), Deadline::default());
     deadline.stop();
     let mut cx = PlanContext::new(&mut budget, &deadline, &[]);
-    let result = joins(ends, SIZE_PX).draw(&VertexOcclusion::default(), 10, &mut hull, &mut cx);
+    let result = joins(ends, SIZE_PX).draw(&HiddenDirections::default(), 10, &mut hull, &mut cx);
     assert!(matches!(result, Err(PlanError::Stopped(_))), "{result:?}");
     assert!(hull.triangles.is_empty());
 }

@@ -6,8 +6,8 @@ use crate::limits::{Budget, Deadline, Limits};
 use crate::request::{self, Rules};
 use crate::spec::BackendChoice;
 
-/// A bumpy sheet of two materials, in which some faces are inside out, lie twice or are missing.
-fn sheet(n: usize) -> String {
+/// A bumpy open surface of two materials, in which some faces are inside out, lie twice or are missing.
+fn open_surface(n: usize) -> String {
     use std::fmt::Write;
     let mut obj = String::new();
     for (i, j) in (0..n * n).map(|k| (k / n, k % n)) {
@@ -29,7 +29,7 @@ fn sheet(n: usize) -> String {
 fn edges_that_are_surely_inside_have_no_outline() {
     let limits = Limits::default();
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
-    let bundle = Bundle::of_one(sheet(60).into_bytes());
+    let bundle = Bundle::of_one(open_surface(60).into_bytes());
     let mesh = import(&bundle, None, &limits, &mut budget, &deadline).unwrap().mesh;
     for cull in ["none", "back"] {
         let keys = [("style", "outline"), ("outline.method", "hull"), ("materials.red.surface.cull", cull)];

@@ -70,7 +70,7 @@ pub fn hiding_materials(groups: &MaterialGroups<'_>) -> Vec<bool> {
     let hides = |(layers, fill): (&&Layers, &Fill)| match fill {
         Fill::Opaque => true,
         Fill::Transparent => false,
-        Fill::None => groups.needs_occluder() && barycentric_wire(layers).is_none(),
+        Fill::None => groups.needs_hiding_surface() && barycentric_wire(layers).is_none(),
     };
     groups.by_material.iter().zip(groups.fills()).map(hides).collect()
 }

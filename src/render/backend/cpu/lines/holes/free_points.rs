@@ -1,7 +1,7 @@
 //! Stage lines, per marked pixel: the points that its faces leave free. Twin of
 //! `shaders/lines/holes/free_points.wgsl`.
 //!
-//! Areas of insets do not tell how much is free where a sheet ends, because some of a face may be
+//! Areas of insets do not tell how much is free where a surface ends, because some of a face may be
 //! hidden. Points do: each of a pixel's points belongs to a
 //! [sample](crate::backend::sample_partition). It is free if that sample shows nothing, or if the
 //! point lies in the inset of the face that the sample shows. Lines of rims are strokes, which cover

@@ -1,24 +1,31 @@
-//! Stage lines, per face and pixel: what the lines along all edges of a surface leave free of it.
-//! Twin of `shaders/lines/holes/holes.wgsl`.
+//! Stage lines, per pixel: the area that lines leave free if all edges of a surface are drawn. Twin
+//! of `shaders/lines/holes/holes.wgsl`.
 //!
-//! Lines cover all of a sheet of faces but the faces' [insets](inset), if each side of each face is a
-//! line. Insets do not overlap, so their areas add up. Pixels in which that may not hold are marked.
-//! In some of them the sheet ends, and [points](free_points) tell what is free:
+//! If each side of each face is a line, then a face is free only in its [inset](inset): the part
+//! that is at least half a line's width from all three sides. Insets of different faces do not
+//! overlap. So the free area of a pixel is the sum of the insets' areas in it, and no line has to
+//! be drawn.
 //!
-//! - a sample shows nothing;
-//! - a visible part of a rim is within a line's reach: a rim is an edge at which the sheet ends on
-//!   screen or turns back, so that its line covers what lies behind the sheet too;
-//! - a face that is seen close by is hidden in part by another that lies well before it.
+//! This fails in some pixels. They are marked, and get their coverage in one of two other ways.
 //!
-//! In the others the strokes of all edges are drawn:
+//! [Points](free_points) are tested one by one where the surface ends:
 //!
-//! - a sample shows a hull, or one close by shows a face that is clipped;
-//! - a [tip](tips) is close by;
-//! - a face that is seen close by is hidden in part by another that it passes through nearby.
+//! - a sample of the pixel shows nothing;
+//! - a visible part of a rim is within half a line's width. A rim is an edge at which the surface
+//!   ends on screen or turns away. The line of a rim also covers what lies behind the surface;
+//! - a face that counts in the pixel is partly hidden by a face that lies well in front of it.
 //!
-//! A face counts in a pixel if it shows a sample there or in one of the eight pixels around. What is
-//! left of a visible face around a point of its inset holds a disc as wide as the line, and
-//! `LinePass::holes_width_px` sees to it that no such disc lies between samples.
+//! The strokes of all edges are drawn in the other marked pixels:
+//!
+//! - a sample of the pixel shows the outline mesh, or a sample in or next to it shows a clipped
+//!   face;
+//! - a [tip](tips) is close;
+//! - a face that counts in the pixel is partly hidden by a face that it intersects nearby.
+//!
+//! A face counts in a pixel if a sample of the pixel, or of one of the eight pixels around it,
+//! shows the face. No face is missed that way: each point of a visible inset is the centre of a
+//! disc that shows the face and is as wide as the line, and `LinePass::holes_width_px` admits only
+//! lines so wide that such a disc contains a sample.
 
 pub(crate) mod dig;
 pub(crate) mod free_points;

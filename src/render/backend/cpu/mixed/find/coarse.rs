@@ -1,7 +1,9 @@
-//! Stage mixed, per pixel: a quick test that most pixels pass whose faces look alike.
+//! Stage mixed, per pixel: a quick test that finds pixels whose faces all look alike. Such a pixel
+//! need not be drawn again, and most pixels pass.
 //!
-//! Looks are kept in bytes. Where the bytes of several faces lie close together, all pairs of these faces look alike.
-//! The looks themselves are compared where bytes lie farther apart.
+//! A face's [`Look`] says what decides its colour. This module remembers the looks of recent faces,
+//! rounded to bytes. A pixel passes if the bytes of its faces differ so little that the looks
+//! themselves are certainly alike. For the other pixels the caller compares the looks.
 
 use super::look::{ALIKE, Look, kinds};
 use crate::backend::cpu::geometry::samples::NOTHING;
@@ -9,8 +11,7 @@ use crate::backend::cpu::geometry::samples::NOTHING;
 /// Faces that are remembered: a power of two.
 const COUNT: usize = 4096;
 
-/// The id in a place that no face has taken. [`NOTHING`] is never remembered, so pixels that show the background do not
-/// pass.
+/// The id in an empty slot. [`NOTHING`] is never remembered, so pixels that show the background do not pass.
 const FREE: u32 = NOTHING - 1;
 
 /// Steps of a byte per unit of the square root of a value.
@@ -23,7 +24,7 @@ const STEPS: f32 = 79.0;
 /// rounded down: where they differ by 7 steps, u and v differ by less than 8. A hundredth is left for what f32 rounds.
 const ALIKE_STEPS: u8 = 7;
 
-/// Of the ranges of three values and the key: the bits that are 0 where faces are alike.
+/// The bits of the three values' ranges and of the key's range that are all 0 if faces are alike.
 const UNLIKE_BITS: u32 = !u32::from_le_bytes([ALIKE_STEPS, ALIKE_STEPS, ALIKE_STEPS, 0]);
 
 const _: () = {
@@ -33,12 +34,12 @@ const _: () = {
     assert!(difference * difference < ALIKE / 2.0 * 0.99);
 };
 
-/// Key byte of the outline's triangles. Materials below have their index; faces of others never pass.
+/// Key byte of the outline's triangles. A material with a lower index has that index as its key. Faces of other
+/// materials never pass.
 const BY_COLOR: u8 = 254;
 
-/// A look in bytes. The lower four are the smallest of each of three values, and the key. The higher four are 255 less
-/// the largest of each, and 255 less the key. So the smaller bytes of two such numbers are the look of both faces
-/// together.
+/// A look in bytes. The lower four are the minimum of each of three values, and the key. The higher four are 255
+/// minus the maximum of each, and 255 minus the key. So the bytewise minimum of two looks has the range of both.
 type Bytes = u64;
 
 /// Bytes of a face that is like no other: its values and key range from 0 to 255, together with those of any face.
@@ -78,7 +79,7 @@ impl CoarseLooks {
         (self.ids[place], self.looks[place]) = (id, in_bytes(look));
     }
 
-    /// True only if each pair of some faces looks alike.
+    /// True if all these faces are remembered and each pair of them certainly looks alike.
     #[inline(always)]
     pub fn are_alike<const N: usize>(&self, ids: [u32; N]) -> bool {
         let mut least = u64::MAX;
@@ -94,11 +95,11 @@ impl CoarseLooks {
     }
 }
 
-/// The smaller ones of the bytes of two numbers.
+/// The bytewise minimum of two numbers.
 #[inline(always)]
 #[allow(unsafe_code)]
 fn smallest_bytes(a: u64, b: u64) -> u64 {
-    // Compilers look at the bytes one by one.
+    // Compilers take the bytes one by one.
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_mm_cvtsi64_si128, _mm_cvtsi128_si64, _mm_min_epu8};

@@ -1,4 +1,5 @@
-//! Stage mixed, per band: the mixed pixels, row by row.
+//! Stage mixed, per band: the list of the mixed pixels, row by row. A bit mask of the same pixels
+//! answers which numbers the pixels of a range of columns have.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Steps of holes in AVX2 instructions, with the same results as without.
+//! The inner loops of [`dig`](super) in AVX2 instructions. The results are the same as without.
 
 #![allow(unsafe_code)]
 

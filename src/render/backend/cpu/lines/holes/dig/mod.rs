@@ -1,5 +1,10 @@
-//! Stage lines, per face: its hole in the pixels around it, eight pixels of a row at a time, and its tips. As the
-//! pixels of [`add_holes_plainly`](crate::backend::cpu::lines::plain::add_holes_plainly) find them.
+//! Stage lines, per band: adds up the areas of the faces' [insets](super::inset) per pixel, and
+//! marks the pixels in which these areas are not reliable.
+//!
+//! An inset is the part of a face that the lines along its sides leave free. The insets of eight
+//! faces are computed at once. Then each face is rasterized by itself, eight pixels of a row at a
+//! time. `add_holes_plainly` in `lines/plain.rs` does the same pixel by pixel. Tests compare the
+//! two.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -73,20 +78,21 @@ fn holes_sampled<const S: usize>(
     }
 }
 
-/// A face's tips lie up to a pixel beyond its samples, and are compared with samples a pixel farther.
+/// Pixels that a face's box grows by: its [tips](super::tips) lie up to a pixel beyond its samples, and
+/// are compared with samples another pixel away.
 const TIPS_PX: usize = 2;
 
-/// Eight samples: their places, across and down, and their ids.
+/// Eight samples: their columns, their rows and their ids.
 type Samples<'s> = (&'s [f32; LANES], &'s [f32; LANES], &'s [u32; LANES]);
 
-/// Faces that may show, and wait until there are eight of them.
+/// Faces that may be visible, collected until there are eight.
 struct Waiting {
     ids: [u32; 2 * LANES],
     len: usize,
 }
 
 impl Waiting {
-    /// Adds those of up to eight faces that touch samples and do not lie behind all tiles there.
+    /// Adds those of up to eight faces that touch samples and are not hidden by all tiles there.
     #[inline(always)]
     fn push_seen<const S: usize>(
         &mut self,
@@ -106,7 +112,7 @@ impl Waiting {
         }
     }
 
-    /// As `push_seen`, of faces with boxes.
+    /// As `push_seen`, for faces whose boxes are known.
     #[inline(always)]
     fn push_boxed(&mut self, context: &RasterContext<'_>, rows: [i32; 2], tiles: &Tiles, faces: &[BoxedFace]) {
         let mut seen = tiles.seen(context.isa, faces, rows);
@@ -118,7 +124,7 @@ impl Waiting {
         }
     }
 
-    /// The first eight, or fewer in the end.
+    /// Removes the first eight, or all if there are fewer.
     #[inline(always)]
     fn take(&mut self) -> Taken {
         let len = self.len.min(LANES);
@@ -131,7 +137,7 @@ impl Waiting {
 
 /// Up to eight faces.
 struct Taken {
-    /// Those after `len` repeat the first.
+    /// Ids after `len` repeat the first.
     ids: [u32; LANES],
     len: usize,
 }
@@ -187,8 +193,8 @@ impl<'a, const S: usize> Digger<'a, S> {
         }
     }
 
-    /// Adds the holes of the faces that wait if there are eight. True if time is up, given how many
-    /// faces were looked at before.
+    /// Adds the holes of the waiting faces if there are eight. True if the deadline has passed.
+    /// `looked_at` is the number of faces that were tested before, for the poll.
     #[inline(always)]
     fn are_dug(
         &mut self,
@@ -273,8 +279,8 @@ impl<'a, const S: usize> Digger<'a, S> {
         shown
     }
 
-    /// Marks around those of `count` pixels of a row in which something hides the face and it counts, as
-    /// bits say.
+    /// Marks the pixels around those of `count` pixels of a row in which something hides the face. Only
+    /// pixels whose bits are set in `close` are tested: the face counts in these.
     #[inline(always)]
     fn mark_hidden(&self, face: (&Inset, u32), [first, y]: [i32; 2], (close, count): (u32, usize), holes: &mut Holes) {
         if !self.may_hide(face, [first, y], count) {
@@ -288,7 +294,7 @@ impl<'a, const S: usize> Digger<'a, S> {
         }
     }
 
-    /// False if [`marks_of_hidden`] finds none in so many pixels of a row, at most eight.
+    /// False if [`marks_of_hidden`] is certainly 0 in `count` pixels of a row, at most eight.
     #[inline(always)]
     #[allow(unsafe_code)]
     fn may_hide(&self, (inset, id): (&Inset, u32), [first, y]: [i32; 2], count: usize) -> bool {
@@ -326,8 +332,8 @@ fn shown_plainly<const S: usize>(ids: &[u32], id: u32) -> u32 {
     shown
 }
 
-/// True if a sample well inside of a face shows something else. Samples are places from a corner, across
-/// and down, with ids.
+/// True if a sample well inside a face shows something else. The places of samples are relative to
+/// `corner`.
 #[inline(always)]
 fn hides_plainly<'s>(inset: &Inset, id: u32, corner: [f32; 2], samples: impl Iterator<Item = Samples<'s>>) -> bool {
     let mut hides = [0_u32; LANES];

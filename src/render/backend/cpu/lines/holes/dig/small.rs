@@ -1,4 +1,5 @@
-//! Holes of faces up to a few pixels: areas are found only where the inset is, in two rows at a time.
+//! Faces of at most a few pixels: areas are computed only in the pixels that the inset touches,
+//! four pixels of two rows at a time.
 
 use super::Digger;
 use crate::backend::cpu::isa::LANES;

@@ -1,5 +1,7 @@
-//! Insets and their areas in AVX2 instructions, lane for lane as without. Compilers leave some of the
-//! steps one by one: the conversion to integers, and minima that mind NaN.
+//! Insets and their areas in AVX2 instructions. Each lane has the same result as without AVX2.
+//!
+//! Written by hand because the compiler does not vectorize two steps of the plain code: the
+//! conversion of f32 to integers, and minima and maxima that treat NaN as Rust does.
 
 #![allow(unsafe_code)]
 
@@ -60,7 +62,7 @@ pub fn insets(context: &RasterContext<'_>, ids: &[u32; LANES], half: [i32; 2], h
     out
 }
 
-/// Slope of an inset's side; 0 for a narrow one.
+/// Slope of an inset's side; 0 where its ends are less than [`NARROW_PX`] apart across.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn slope(from: [__m256; 2], to: [__m256; 2]) -> __m256 {
@@ -94,7 +96,8 @@ pub fn areas(inset: &Inset, lefts: &[f32; LANES], tops: &[f32; LANES]) -> [u32; 
     to_words(_mm256_cvttps_epi32(units))
 }
 
-/// As `mean_clamped` of insets. A mean that is no number becomes the smaller end, and is not taken.
+/// As `mean_clamped` of insets. Where `a` and `b` are equal, the mean is NaN: the first minimum turns
+/// it into an end, and the last line takes the middle instead.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn mean_clamped(a: __m256, b: __m256) -> __m256 {

@@ -1,24 +1,25 @@
-//! Stage lines, per edge and triangle: what stands on a sheet that is seen from below. Twin of
-//! `shaders/lines/sheets.wgsl`.
+//! Stage lines, per edge and triangle: edges that lie in the plane of a triangle that hides their
+//! faces. Twin of `shaders/lines/coplanar.wgsl`.
 //!
-//! The foot of a wall that stands on a floor lies in the floor's plane. Seen from above it is visible, and hidden-line
-//! removal keeps it whatever the rounding of depths says. Seen from below, the floor hides the wall. So it
-//! hides the foot, too.
+//! An example is the edge at which a wall stands on a floor: it lies in the floor's plane. Seen
+//! from above the edge is visible, and hidden-line removal keeps it however depths are rounded.
+//! Seen from below, the floor hides the wall. So it has to hide the edge too, though both have the
+//! same depth.
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::steepness::{Corner, NEARER_RATIO, sides};
 use crate::backend::cpu::geometry::transform::recip;
 use crate::plan::Edge;
 
-/// Least distance of an edge from the sides of a sheet's triangle, 1/256 px. Closer to them it may be an edge of the
-/// triangle itself, or of its neighbour, whose vertices are others.
+/// Least distance of an edge from the triangle's sides, 1/256 px. A closer edge may be one of the triangle itself, or of
+/// a neighbour that has vertices of its own.
 pub const SIDE_MARGIN: f32 = 4.0;
 
 /// Share of positions by which rounding may move them out of a triangle's plane: some units of f32's last place.
 pub const IN_PLANE: f32 = 1.0 / 2_097_152.0;
 
-/// A triangle on screen.
-pub struct Sheet {
+/// A triangle on screen that may hide an edge.
+pub struct HidingTriangle {
     pub id: u32,
     /// Times their W.
     pub corners: [Corner; 3],
@@ -27,7 +28,7 @@ pub struct Sheet {
     pub slack: f32,
 }
 
-impl Sheet {
+impl HidingTriangle {
     /// True if an edge lies in the triangle's plane, and all of its faces on the side that the viewer does not see. The
     /// middle of the part that is inside the triangle on screen has these weights.
     ///

@@ -1,4 +1,4 @@
-//! Vertex occlusion: the directions around a vertex that its own faces cover on screen, and the
+//! Hidden directions: the directions around a vertex that its own faces cover on screen, and the
 //! silhouette edges there that these faces hide.
 //!
 //! At a cusp, where the surface folds, a contour ends inside the shape. The fold's other silhouette
@@ -27,7 +27,7 @@ const EQUAL: f64 = 1e-9;
 
 /// The directions that vertices' own faces cover: arcs that do not touch, by vertex and angle.
 #[derive(Debug, Default)]
-pub struct VertexOcclusion {
+pub struct HiddenDirections {
     arcs: Vec<Arc>,
 }
 
@@ -41,8 +41,8 @@ struct Arc {
     slope: [f64; 2],
 }
 
-impl VertexOcclusion {
-    /// The occlusion around the vertices of `ends`, which are sorted by vertex. Sets
+impl HiddenDirections {
+    /// The directions around the vertices of `ends`, which are sorted by vertex. Sets
     /// [`EdgeEnd::is_hidden`] of each end at a vertex with a quad.
     pub fn around(ends: &mut [EdgeEnd], view: &ScreenMesh<'_>, cx: &mut PlanContext<'_>) -> Result<Self, PlanError> {
         if ends.is_empty() {
@@ -73,7 +73,7 @@ impl VertexOcclusion {
         Ok(Self { arcs })
     }
 
-    /// The occlusion of one face, for tests.
+    /// The directions that one face hides, for tests.
     #[cfg(test)]
     pub fn of_one(vertex: u32, [from, to]: [f64; 2]) -> Self {
         Self { arcs: vec![Arc { vertex, from, to, slope: [0.0; 2] }] }

@@ -1,8 +1,14 @@
-// Stage lines, per edge and triangle: what stands on a sheet that is seen from below. Twin of
-// src/render/backend/cpu/lines/sheets.rs, which says why; edge.wgsl declares the buffers.
+// Stage lines, per edge and triangle: edges that lie in the plane of a triangle that hides their
+// faces. Twin of src/render/backend/cpu/lines/coplanar.rs, which says why. edge.wgsl declares the
+// buffers.
+//
+// Uses: common.wgsl (NAMES_ALL_FACES, OUTSIDE, recip, rn, rn3), one_job.wgsl (batch, frame),
+// geometry/steepness.wgsl (MIN_POSITIVE, NEARER_RATIO, sides_of, sum3), lines/contour.wgsl
+// (NO_FACE), lines/edge.wgsl (vertices), lines/hidden_lines.wgsl (corners_of_id),
+// lines/segment.wgsl (position_of).
 
-// Least distance of an edge from the sides of a sheet's triangle, 1/256 px. Closer to them it may be an edge of the
-// triangle itself, or of its neighbour, whose vertices are others.
+// Least distance of an edge from the triangle's sides, 1/256 px. A closer edge may be one of the triangle itself, or of
+// a neighbour that has vertices of its own.
 const SIDE_MARGIN: f32 = 4.0;
 
 // Share of positions by which rounding may move them out of a triangle's plane: some units of f32's last place.

@@ -4,13 +4,13 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::*;
 
-fn occlusion(arcs: &[[f64; 2]]) -> VertexOcclusion {
-    VertexOcclusion { arcs: arcs.iter().map(|&[from, to]| Arc { vertex: 3, from, to, slope: [0.0; 2] }).collect() }
+fn hidden(arcs: &[[f64; 2]]) -> HiddenDirections {
+    HiddenDirections { arcs: arcs.iter().map(|&[from, to]| Arc { vertex: 3, from, to, slope: [0.0; 2] }).collect() }
 }
 
 fn gaps(arcs: &[[f64; 2]], range: [f64; 2]) -> Vec<[f64; 2]> {
     let mut found = Vec::new();
-    occlusion(arcs).gaps(3, range, |gap| found.push(gap));
+    hidden(arcs).gaps(3, range, |gap| found.push(gap));
     found
 }
 
@@ -28,7 +28,7 @@ fn directions_without_a_face_are_free() {
     assert_eq!(gaps(&[[0.0, TAU]], [1.0, 6.0]), [[0.0; 2]; 0]);
     // Another vertex's faces do not count.
     let mut found = Vec::new();
-    occlusion(&two).gaps(2, [0.0, 4.0], |gap| found.push(gap));
+    hidden(&two).gaps(2, [0.0, 4.0], |gap| found.push(gap));
     assert_eq!(found, [[0.0, 4.0]]);
 }
 

@@ -1,5 +1,5 @@
 //! Stage shade, per point: the file's occlusion texture, which darkens ambient light and no other.
-//! Twin of `shaders/surface/occlusion.wgsl`.
+//! Twin of `shaders/surface/occlusion_texture.wgsl`.
 
 use super::light::LightLanes;
 use crate::backend::cpu::vector::dot;
@@ -8,7 +8,7 @@ use crate::plan::{Lights, Projection};
 /// Takes ambient light away where the texture's red is below 1. `strength` is 0 for none of it to 1; metals
 /// have no ambient light of this kind, and keep what they mirror.
 #[inline(always)]
-pub fn occlude<const N: usize>(
+pub fn apply_occlusion_texture<const N: usize>(
     light: &mut LightLanes<N>,
     (lights, projection): (&Lights, &Projection),
     (strength, red): (f32, &[f32; N]),
