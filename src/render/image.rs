@@ -140,6 +140,7 @@ pub trait RowSink: Send {
 
 /// The file format of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ImageFormat {
     /// PNG: lossless, the default.
     Png,
@@ -147,6 +148,26 @@ pub enum ImageFormat {
     Webp,
     /// JPEG: lossy, without alpha.
     Jpeg,
+}
+
+impl ImageFormat {
+    /// The usual extension of its files.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Webp => "webp",
+            Self::Jpeg => "jpg",
+        }
+    }
+
+    /// Its media type.
+    pub fn media_type(self) -> &'static str {
+        match self {
+            Self::Png => "image/png",
+            Self::Webp => "image/webp",
+            Self::Jpeg => "image/jpeg",
+        }
+    }
 }
 
 /// The 255 linear values at which the stored sRGB byte changes: `thresholds[k]` is the smallest

@@ -243,15 +243,13 @@ struct PollCounter {
 }
 
 impl Deadline {
-    /// A deadline that counts its polls and stops at the poll numbered `stop_at`, from 1.
-    #[doc(hidden)]
+    /// For tests: a deadline that counts its polls and stops at the poll numbered `stop_at`, from 1.
     pub fn after_polls(stop_at: u64) -> Self {
         let counter = Some(PollCounter { polls: AtomicU64::new(0), stop_at });
         Self(Arc::new(DeadlineState { is_stopped: AtomicBool::new(false), counter }))
     }
 
-    /// Polls so far, of a deadline that counts them.
-    #[doc(hidden)]
+    /// For tests: polls so far, of a deadline that counts them.
     pub fn polls(&self) -> u64 {
         self.0.counter.as_ref().map_or(0, |counter| counter.polls.load(Ordering::Relaxed))
     }

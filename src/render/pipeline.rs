@@ -127,7 +127,7 @@ pub fn draw_cells(
         // What a cell takes is free again before the next.
         let budget = cx.budget.clone();
         let Context { backends, deadline, ended, .. } = cx;
-        let mut of_cell = Context { backends: &mut **backends, budget, deadline, ended: &mut **ended };
+        let mut of_cell = Context { backends, budget, deadline, ended: &mut **ended };
         let drawn = draw(Some(&cell), &mut of_cell)?;
         canvas.paste(&cell, &drawn.image);
         let Some(view) = cell.view else { continue };

@@ -37,13 +37,8 @@ pub fn unopened(detail: impl Into<String>) -> Check {
 pub fn of_unreadable(error: &MeshError) -> Option<Check> {
     match error.fault {
         MeshFault::BundleBroken | MeshFault::EntryUnclear | MeshFault::Limit(_) | MeshFault::Stopped => None,
-        MeshFault::Unrecognised
-        | MeshFault::Broken
-        | MeshFault::Empty
-        | MeshFault::OutsideBundle
-        | MeshFault::DecoderFailed
-        | MeshFault::DecoderCrashed
-        | MeshFault::Unsupported => Some(unopened(error.to_string())),
+        // Broken, empty, in no format that is known: all that is the file's own.
+        _ => Some(unopened(error.to_string())),
     }
 }
 

@@ -69,6 +69,7 @@ pub trait Renderer {
 
 /// A back-end, as reports name it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum BackendKind {
     /// Our own rasterizer.
     Cpu,
@@ -88,6 +89,7 @@ impl BackendKind {
 
 /// Errors of drawing a plan. Never the client's fault, except for an exceeded deadline.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DrawError {
     /// The deadline has passed.
     #[error(transparent)]

@@ -36,6 +36,7 @@ use crate::plan::{
 };
 
 /// Every constant that a shader and Rust both have, as the shader calls it.
+#[expect(clippy::too_many_lines, reason = "a table")]
 fn shared_constants() -> BTreeMap<&'static str, f64> {
     let mut all = BTreeMap::new();
     macro_rules! add {

@@ -20,6 +20,7 @@ pub struct MeshError {
 
 /// The kinds of fault, each with its own status and stable code at the edge of the program.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum MeshFault {
     /// Not a known mesh format.
     Unrecognised,
@@ -43,6 +44,25 @@ pub enum MeshFault {
     Limit(LimitExceeded),
     /// The job's time was up.
     Stopped,
+}
+
+impl MeshFault {
+    /// The stable code under which programs know it. Limits and deadlines have codes that do not depend on the mesh.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Unrecognised => "mesh_unrecognised",
+            Self::Broken => "mesh_broken",
+            Self::Empty => "mesh_empty",
+            Self::OutsideBundle => "mesh_outside_bundle",
+            Self::BundleBroken => "bundle_broken",
+            Self::EntryUnclear => "entry_unclear",
+            Self::DecoderFailed => "decoder_failed",
+            Self::DecoderCrashed => "decoder_crashed",
+            Self::Unsupported => "mesh_unsupported",
+            Self::Limit(_) => "limit",
+            Self::Stopped => "deadline",
+        }
+    }
 }
 
 impl MeshError {

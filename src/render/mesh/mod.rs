@@ -1,5 +1,5 @@
 //! The [`Mesh`], the one form that every importer produces, and what is computed from it:
-//! [`normals`], [`edges`], [`topology`], [`intersections`], [`charts`], [`measure`].
+//! [`normals`], [`creases`], [`edges`], [`topology`].
 //!
 //! **Invariant**: nothing in this room, and nothing after it, depends on the file format.
 

@@ -5,6 +5,7 @@ use crate::scene::SceneError;
 
 /// A mesh and a request that do not make a picture. The text is safe to show to clients.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlanError {
     /// The picture takes more than is allowed.
     #[error(transparent)]
@@ -15,6 +16,17 @@ pub enum PlanError {
     /// The job's time was up, or it was cancelled.
     #[error(transparent)]
     Stopped(#[from] Stopped),
+}
+
+impl PlanError {
+    /// The stable code under which programs know it. Limits and deadlines have codes that do not depend on the plan.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Limit(_) => "limit",
+            Self::NoCamera => "no_camera",
+            Self::Stopped(_) => "deadline",
+        }
+    }
 }
 
 impl From<SceneError> for PlanError {

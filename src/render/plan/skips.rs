@@ -14,6 +14,7 @@ pub struct Skip {
 
 /// Kinds of work that a plan can leave out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SkipKind {
     /// Filling and shading a surface.
     Surface,

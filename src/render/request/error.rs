@@ -20,6 +20,7 @@ pub struct RequestError {
 
 /// The kinds of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RequestFault {
     /// There is no such key.
     UnknownKey,

@@ -5,7 +5,6 @@ use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use super::state::AppState;
 use crate::digest::Digest;
 use crate::store::Reading;
-use meshsnap_render::image::ImageFormat;
 use meshsnap_render::spec::{BackendChoice, Spec};
 
 /// Longest address that is given out: proxies and browsers may refuse longer ones.
@@ -34,11 +33,7 @@ impl Address {
         spec: &Spec,
         keys: &[(String, String)],
     ) -> Option<Self> {
-        let extension = match spec.image.format? {
-            ImageFormat::Png => "png",
-            ImageFormat::Webp => "webp",
-            ImageFormat::Jpeg => "jpg",
-        };
+        let extension = spec.image.format?.extension();
         let format_in = reading.format_in.map(|format| ("format_in", format.name()));
         let entry = reading.entry.as_deref().map(|entry| ("entry", entry));
         let keys = keys.iter().map(|(key, text)| (key.as_str(), text.as_str())).chain(format_in).chain(entry);

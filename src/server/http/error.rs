@@ -336,31 +336,23 @@ impl From<&RenderError> for ApiError {
 
 impl From<&PlanError> for ApiError {
     fn from(error: &PlanError) -> Self {
-        let code = match error {
-            PlanError::Limit(limit) => return limit.into(),
-            PlanError::Stopped(stopped) => return Self::deadline(stopped.to_string()),
-            PlanError::NoCamera => "no_camera",
-        };
-        Self::new(ErrorKind::Content, code, error.to_string())
+        match error {
+            PlanError::Limit(limit) => limit.into(),
+            PlanError::Stopped(stopped) => Self::deadline(stopped.to_string()),
+            other => Self::new(ErrorKind::Content, other.code(), other.to_string()),
+        }
     }
 }
 
 impl From<&MeshError> for ApiError {
     fn from(error: &MeshError) -> Self {
-        let (kind, code) = match &error.fault {
-            MeshFault::Unrecognised => (ErrorKind::UnknownFormat, "mesh_unrecognised"),
-            MeshFault::Broken => (ErrorKind::Content, "mesh_broken"),
-            MeshFault::Empty => (ErrorKind::Content, "mesh_empty"),
-            MeshFault::OutsideBundle => (ErrorKind::Content, "mesh_outside_bundle"),
-            MeshFault::BundleBroken => (ErrorKind::Content, "bundle_broken"),
-            MeshFault::EntryUnclear => (ErrorKind::Content, "entry_unclear"),
-            MeshFault::DecoderFailed => (ErrorKind::Content, "decoder_failed"),
-            MeshFault::DecoderCrashed => (ErrorKind::Content, "decoder_crashed"),
-            MeshFault::Unsupported => (ErrorKind::Content, "mesh_unsupported"),
+        let kind = match &error.fault {
             MeshFault::Limit(limit) => return limit.into(),
             MeshFault::Stopped => return Self::deadline(error.detail.clone()),
+            MeshFault::Unrecognised => ErrorKind::UnknownFormat,
+            _ => ErrorKind::Content,
         };
-        Self::new(kind, code, error.detail.clone())
+        Self::new(kind, error.fault.code(), error.detail.clone())
     }
 }
 

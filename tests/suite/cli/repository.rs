@@ -125,6 +125,7 @@ fn said_of(repository: &Path, path: &str) -> Vec<String> {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "one story, told step by step")]
 fn each_commit_is_named_in_words_and_nothing_else() {
     let Some(models) = large_folder("models") else { return };
     let folder = tempfile::tempdir().unwrap();

@@ -48,6 +48,7 @@ fn none() -> HardwareHint {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table")]
 fn the_choice_follows_what_the_machine_has() {
     use GpuKind::{Any, Hardware};
     use HardwareHint::Maybe;

@@ -270,21 +270,7 @@ impl Read {
         for (folder, name) in self.missing.iter().take(100) {
             cx.bundle.note_missing(folder, name);
         }
-        let mut images = Vec::with_capacity(self.images.len());
-        for (name, image) in self.images {
-            let content = match image {
-                Image::Absent => ImageContent::Absent,
-                Image::Embedded(bytes) => ImageContent::Encoded(bytes.into()),
-                Image::OfBundle(number) => match cx.bundle.try_file(number as usize) {
-                    Some(file) => {
-                        cx.budget.spend("a texture file", file.bytes.len() as u64, 1)?;
-                        ImageContent::Encoded(file.bytes.as_ref().into())
-                    }
-                    None => return Ok(None),
-                },
-            };
-            images.push(ImageSource { name: printable(&name), content });
-        }
+        let Some(images) = images_of(self.images, cx)? else { return Ok(None) };
         let lists = Lists {
             vertices: self.positions.len(),
             triangles: self.triangles.len(),
@@ -342,6 +328,26 @@ impl Read {
             ..RawMesh::default()
         }))
     }
+}
+
+/// The images, those of the bundle paid for; None if one is not there.
+fn images_of(images: Vec<(String, Image)>, cx: &mut Context<'_>) -> Result<Option<Vec<ImageSource>>, MeshError> {
+    let mut found = Vec::with_capacity(images.len());
+    for (name, image) in images {
+        let content = match image {
+            Image::Absent => ImageContent::Absent,
+            Image::Embedded(bytes) => ImageContent::Encoded(bytes.into()),
+            Image::OfBundle(number) => match cx.bundle.try_file(number as usize) {
+                Some(file) => {
+                    cx.budget.spend("a texture file", file.bytes.len() as u64, 1)?;
+                    ImageContent::Encoded(file.bytes.as_ref().into())
+                }
+                None => return Ok(None),
+            },
+        };
+        found.push(ImageSource { name: printable(&name), content });
+    }
+    Ok(Some(found))
 }
 
 /// The lengths of lists that indices refer to.

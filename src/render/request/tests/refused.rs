@@ -5,6 +5,7 @@ use crate::request::*;
 
 /// Each bad request, its fault, the key that the error must name, and a part of what it must say.
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table")]
 fn every_bad_value_is_refused_by_name() {
     use RequestFault::{Conflict, OutOfRange, UnknownKey, WrongType};
     type Case = (&'static [(&'static str, &'static str)], RequestFault, &'static str, &'static str);

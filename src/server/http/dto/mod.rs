@@ -12,7 +12,6 @@ use serde::Serialize;
 use super::error::ApiError;
 use crate::digest::Digest;
 use crate::jobs::Media;
-use meshsnap_render::image::ImageFormat;
 use meshsnap_render::import::Bundle;
 
 /// An error: a problem document (RFC 9457).
@@ -109,9 +108,7 @@ impl MeshDto {
 /// The media type of a result.
 pub fn media_type(media: Media) -> &'static str {
     match media {
-        Media::Picture(ImageFormat::Png) => "image/png",
-        Media::Picture(ImageFormat::Webp) => "image/webp",
-        Media::Picture(ImageFormat::Jpeg) => "image/jpeg",
+        Media::Picture(format) => format.media_type(),
         Media::Json => "application/json",
     }
 }

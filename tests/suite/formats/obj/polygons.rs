@@ -6,6 +6,7 @@ use crate::support::files::same::edges;
 /// The area of the triangles, and that none runs against the polygon, tell that a polygon was cut
 /// rightly.
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table")]
 fn concave_polygons_are_cut_inside() {
     let comb = |teeth: u32| {
         let mut outline = vec![[0.0, 0.0], [f64::from(2 * teeth), 0.0]];

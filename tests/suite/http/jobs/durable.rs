@@ -47,6 +47,7 @@ fn next(state: &mut u64) -> u64 {
 
 /// Jobs with one of a few requests each. A larger number in `MESHSNAP_KILLS` kills more often.
 #[test]
+#[expect(clippy::too_many_lines, reason = "one story, told step by step")]
 fn every_accepted_job_survives_kill_9_and_ends_once_with_the_right_picture() {
     let kills: u64 = std::env::var("MESHSNAP_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(8);
     let queries: Vec<String> =

@@ -138,6 +138,7 @@ fn check(document: &Value, method: &str, path: &str, answer: &Answer) {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table")]
 fn answers_are_as_documented() {
     let (server, document) = (Server::start(&["--limit-triangles", "100"]), document());
     const THUMBNAIL: &str = "/v1/meshes/{sha256}/render.{extension}";

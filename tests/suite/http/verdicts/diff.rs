@@ -147,6 +147,7 @@ fn stored_meshes_and_bundles_are_compared_and_answers_are_kept() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table")]
 fn mistakes_are_refused_with_what_is_wrong() {
     let server = Server::start(&["--limit-triangles", "100", "--limit-bundle-entries", "3"]);
     let body = sides(CUBE_OBJ, CUBE_OBJ);

@@ -120,6 +120,7 @@ impl Kernel {
         }
     }
 
+    #[expect(clippy::too_many_lines, reason = "one arm for each kernel")]
     fn own_source(self) -> String {
         let keep_nearest = |write: SampleWrite| if write == SampleWrite::Both { SAMPLES_64 } else { SAMPLES_32 };
         // The place to which results go, and what of a triangle is found: first of small ones, then in tiles.
