@@ -8,7 +8,7 @@ use serde::de::{DeserializeSeed, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value as Json};
 
 /// The reason why a document is refused.
-pub enum Fault {
+pub enum DocumentError {
     /// It is nested this deep.
     TooDeep(u64),
     /// It is not JSON.
@@ -19,19 +19,19 @@ pub enum Fault {
 }
 
 /// Parses a document of at most this depth.
-pub fn parse(document: &[u8], depth_max: u64) -> Result<Json, Fault> {
+pub fn parse(document: &[u8], depth_max: u64) -> Result<Json, DocumentError> {
     // Checked before the parser runs, because it is recursive.
     let depth = depth(document);
     if depth > depth_max {
-        return Err(Fault::TooDeep(depth));
+        return Err(DocumentError::TooDeep(depth));
     }
     let mut repeated = None;
     let mut parser = serde_json::Deserializer::from_slice(document);
     let parsed = Place { path: "", repeated: &mut repeated }.deserialize(&mut parser);
     match (parsed.and_then(|json| parser.end().map(|()| json)), repeated) {
-        (_, Some(key)) => Err(Fault::Repeated(key)),
+        (_, Some(key)) => Err(DocumentError::Repeated(key)),
         (Ok(json), None) => Ok(json),
-        (Err(error), None) => Err(Fault::NotJson(error)),
+        (Err(error), None) => Err(DocumentError::NotJson(error)),
     }
 }
 
@@ -150,7 +150,7 @@ mod tests {
         }
         assert_eq!(cases, 10);
         for text in ["", "{", "[1,]", "1 2", "{\"a\":1}}", "nul", "\"\u{1}\"", "1e999"] {
-            assert!(matches!(parse(text.as_bytes(), 128), Err(Fault::NotJson(_))), "{text}");
+            assert!(matches!(parse(text.as_bytes(), 128), Err(DocumentError::NotJson(_))), "{text}");
         }
     }
 
@@ -165,7 +165,10 @@ mod tests {
             (r#"{"":1,"":2}"#, ""),
         ];
         for (text, key) in cases {
-            assert!(matches!(parse(text.as_bytes(), 128), Err(Fault::Repeated(named)) if named == key), "{text}");
+            assert!(
+                matches!(parse(text.as_bytes(), 128), Err(DocumentError::Repeated(named)) if named == key),
+                "{text}"
+            );
         }
     }
 }
