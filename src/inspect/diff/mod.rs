@@ -221,7 +221,7 @@ impl Compared {
 }
 
 /// All that was found, for the words.
-struct Found<'a> {
+struct Comparison<'a> {
     a: Side<'a>,
     b: Side<'a>,
     diagonal: f64,
@@ -279,11 +279,12 @@ pub fn compare(
     let closed_holes = holes::only_in(of_a, of_b, budget)?;
     let materials = materials::compare(a.mesh, b.mesh, &faces.common, budget)?;
     let ways = [there, back];
-    let found = Found { a, b, diagonal, tolerance, has_same_order, faces, parts, whole, new_holes, closed_holes, ways };
+    let found =
+        Comparison { a, b, diagonal, tolerance, has_same_order, faces, parts, whole, new_holes, closed_holes, ways };
     Ok(found.compared(topologies, t_junctions, materials))
 }
 
-impl Found<'_> {
+impl Comparison<'_> {
     fn compared(mut self, topologies: [Topology; 2], t_junctions: [Option<u64>; 2], materials: Materials) -> Compared {
         let [of_a, of_b] =
             [(self.a, &topologies[0]), (self.b, &topologies[1])].map(|(side, topology)| size(side, topology));

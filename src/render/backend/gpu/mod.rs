@@ -37,7 +37,7 @@ use self::params::{attributes, corner_triangles, edge_lists, hull_materials, sam
 use self::pipelines::Slot;
 use self::pipelines::key::pipeline_key;
 use self::recorder::Recorder;
-use self::residents::{Found, Source};
+use self::residents::{ListLookup, Source};
 use self::schedule::Schedule;
 use self::schedule::sizes::{
     DeviceTraits, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, is_painted,
@@ -354,13 +354,13 @@ fn supply(
 ) -> Result<(), DrawError> {
     if let Some(source) = &source {
         let buffer = match gpu.residents.find(slot, source) {
-            Found::Buffer(buffer) => Some(buffer),
-            Found::Wanted => {
+            ListLookup::Buffer(buffer) => Some(buffer),
+            ListLookup::Wanted => {
                 let buffer = Buffers::filled(&gpu.handles, parts)?;
                 buffers.keep_later(slot, source, &buffer);
                 Some(buffer)
             }
-            Found::Unwanted => None,
+            ListLookup::Unwanted => None,
         };
         if let Some(buffer) = buffer {
             buffers.bind(slot, buffer);
