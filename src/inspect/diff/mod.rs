@@ -220,7 +220,7 @@ impl Compared {
     }
 }
 
-/// All that was found, for the words.
+/// All that a comparison found, from which the summary in words is written.
 struct Comparison<'a> {
     a: Side<'a>,
     b: Side<'a>,
