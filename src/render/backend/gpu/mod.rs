@@ -305,7 +305,7 @@ impl GpuRenderer {
         Ok(Some((0..shares.len()).map(|job| pictures.rgba(job)).collect()))
     }
 
-    /// Waits for the job's turn among those that are alike. None if it is to be drawn alone, whoever else is drawn.
+    /// Waits for the job's turn among those that are alike. None if it is to be drawn alone.
     fn turn(&self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Option<Drawn<'_>>, DrawError> {
         let Some((schedule, share)) = share_of(&self.gpu, plan)? else { return Ok(None) };
         let drawn = match self.gpu.gangs.turn(share, deadline)? {
