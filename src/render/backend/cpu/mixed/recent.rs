@@ -1,4 +1,5 @@
-//! Stage mixed: the triangles that were offered last, set up. Neighbouring pixels are offered the same ones.
+//! Stage mixed: a cache of the triangles that were used last, with their edge functions set up.
+//! Neighbouring pixels mostly show the same triangles.
 
 use super::band_triangles::{BandTriangles, ScreenTriangle};
 use super::triangle::PointTriangle;
