@@ -1,6 +1,5 @@
-// Depths that are compared: what rounding does to them, the slope of a triangle's depth on screen, given its
-// corners times their W, and the areas that its sides span with a point: weights of its corners' depths.
-// Twin of src/render/backend/cpu/geometry/steepness.rs.
+// Comparisons of depths: the tolerance for rounding, and the slope of a triangle's depth on screen,
+// from its corners times their W. Twin of src/render/backend/cpu/geometry/steepness.rs.
 //
 // Uses: common.wgsl (recip, rn, rn2, rn3).
 

@@ -1,5 +1,6 @@
-// Stage lines, per edge: selects silhouettes and removes edges of faces that face away. Twin of
-// src/render/backend/cpu/lines/contour.rs; edge.wgsl declares the buffers.
+// Stage lines, per edge: decides whether the edge is drawn in this view. A pass of contours keeps
+// only silhouettes, and on closed surfaces an edge is dropped if all its faces face away from the
+// viewer. Twin of src/render/backend/cpu/lines/contour.rs. edge.wgsl declares the buffers.
 //
 // Uses: common.wgsl (CONTOUR, CONTOURS, has, INSIDE_OUT, OUTSIDE, rn, SKIP_BACK), one_job.wgsl
 // (batch), geometry/triangle.wgsl (area_of, is_negative, is_zero), lines/edge.wgsl (triangles,

@@ -1,5 +1,5 @@
-// Stage lines, per pixel: the union of its strokes, composited over the colours. Twin of
-// src/render/backend/cpu/lines/coverage.rs.
+// Stage lines, per pixel: the coverage by the union of all strokes, and the lines' colour
+// composited over the pixel. Twin of src/render/backend/cpu/lines/coverage.rs.
 //
 // Uses: common.wgsl (ADAPTIVE, FIRST_PASS, first_visibility_sample, has, HOLED, HOLES, HULL,
 // LIT_PASS, PEELING, recip, rn, rn3, rn4, rolled_off, sample_count, SURFACE, TINTED_PASS, Vertex,

@@ -1,8 +1,8 @@
-// Stage lines, per pixel: the surface's light on lit lines. Twin of
+// Stage lines, per pixel: the light on lines that are lit like the surface. Twin of
 // src/render/backend/cpu/lines/line_light.rs.
 //
-// Light is affine in the colour that it falls on: the mean over the samples that see the surface,
-// or, where none does, the light on the line's own face.
+// Light changes a colour by a factor and a summand. Both are the means over the samples that show
+// the surface. If no sample does, they are those of the light on the line's own face.
 //
 // Uses: common.wgsl (first_visibility_sample, pixel_corner, sample_count, sample_offset,
 // WORKGROUP), one_job.wgsl (batch, frame), surface/barycentric.wgsl (barycentrics),

@@ -46,7 +46,7 @@ fn radius_at(level: u32) -> f32 {
 }
 
 // Position of a pixel's centre relative to a piece of an edge.
-struct Place {
+struct PixelDistances {
     // Distance from the line.
     across: f32,
     // Distances past the start and past the end.
@@ -57,15 +57,15 @@ struct Place {
 
 // `start` and `end` are the piece's, in pixels from the pixel's centre, `along` the edge's
 // direction.
-fn place_of(along: vec2<f32>, start: vec2<f32>, end: vec2<f32>) -> Place {
+fn place_of(along: vec2<f32>, start: vec2<f32>, end: vec2<f32>) -> PixelDistances {
     let across = rn(along.y * start.x) - rn(along.x * start.y);
     let past_start = -(rn(along.x * start.x) + rn(along.y * start.y));
     let past_end = -(rn(along.x * end.x) + rn(along.y * end.y));
-    return Place(across, vec2(past_start, past_end), max(max(-past_start, past_end), 0.0));
+    return PixelDistances(across, vec2(past_start, past_end), max(max(-past_start, past_end), 0.0));
 }
 
 // True if a piece of an edge is within the line's reach of a pixel.
-fn touches(place: Place) -> bool {
+fn touches(place: PixelDistances) -> bool {
     let reach = reach_of_line();
     return rn(place.across * place.across) + rn(place.beyond * place.beyond) <= rn(reach * reach);
 }

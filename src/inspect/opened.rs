@@ -60,8 +60,8 @@ impl Opened {
     /// surfaces that counts as the same; None: what encodings round away.
     pub fn diff(&self, other: &Self, max_distance: Option<f64>, deadline: &Deadline) -> Result<Compared, MeshError> {
         let mut budget = self.budget_beside(other)?;
-        let [a, b] =
-            [&self.imported, &other.imported].map(|Imported { mesh, report, .. }| diff::Side { mesh, import: report });
+        let [a, b] = [&self.imported, &other.imported]
+            .map(|Imported { mesh, report, .. }| diff::ComparedFile { mesh, import: report });
         diff::compare(a, b, max_distance, &mut budget, deadline)
     }
 

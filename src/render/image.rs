@@ -37,7 +37,7 @@ enum Memory {
 }
 
 impl Pixels {
-    /// Pixels in somebody else's memory.
+    /// Pixels in memory that another owner has lent.
     #[cfg(feature = "gpu")]
     pub(crate) fn shared(memory: Arc<dyn SharedMemory>) -> Self {
         Self(Memory::Shared(memory))

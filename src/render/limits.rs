@@ -47,7 +47,7 @@ pub trait Lend: std::fmt::Debug + Send + Sync {
     /// ever hold.
     fn lend(&self, bytes: u64) -> Result<(), u64>;
 
-    /// The job holds 0 bytes from now on: somebody else counts those that it has borrowed.
+    /// The job holds 0 bytes from now on. The bytes that it has borrowed are counted elsewhere.
     fn restart(&self);
 }
 

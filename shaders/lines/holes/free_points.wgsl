@@ -3,9 +3,9 @@
 //
 // Uses: common.wgsl (pixel_corner, rn, sample_count), one_job.wgsl (batch, frame),
 // lines/coverage.wgsl (sample_masks, strokes, triangles, vertices), lines/holes/inset.wgsl
-// (inset_of, Side), lines/lattice.wgsl (lattice_points, product, units), lines/seen.wgsl (seen_at),
-// lines/stroke_words.wgsl (AREA_UNIT, AREA_WORD, CARRY_WORD, COUNT_WORD, MASK_WORD, MASK_WORDS,
-// STROKE_WORDS).
+// (inset_of, InsetSide), lines/lattice.wgsl (lattice_points, product, units), lines/seen.wgsl
+// (seen_at), lines/stroke_words.wgsl (AREA_UNIT, AREA_WORD, CARRY_WORD, COUNT_WORD, MASK_WORD,
+// MASK_WORDS, STROKE_WORDS).
 
 // A side of an inset: the points at least `least` along the normal lie inside. Both in 1/16384 px.
 struct HalfPlane {
@@ -57,7 +57,7 @@ fn add_points(i: u32) {
     strokes[at + COUNT_WORD] = all;
 }
 
-fn half_plane(side: Side, pixel: vec2<i32>) -> HalfPlane {
+fn half_plane(side: InsetSide, pixel: vec2<i32>) -> HalfPlane {
     let from_corner = vec2<f32>(pixel_corner(pixel) + 128) - side.corner;
     let distance = rn(side.unit.x * from_corner.y) - rn(side.unit.y * from_corner.x);
     let least = rn((batch.line_width * 128.0 - distance) * (1.0 / 256.0));

@@ -1,8 +1,8 @@
-// Stage lines, per pixel: what the lines along all edges of a surface leave free of it. Twin of
-// src/render/backend/cpu/lines/holes/mod.rs.
+// Stage lines, per pixel: the area that lines leave free if all edges of a surface are drawn. Twin
+// of src/render/backend/cpu/lines/holes/mod.rs, which explains insets, marks and points.
 //
-// The CPU goes from face to face. A thread here looks for the faces that are seen in its pixel and
-// the eight around it, so that no two threads add to the same sum.
+// The CPU goes from face to face. A thread here goes through the faces that are seen in its pixel
+// and in the eight around it, so that no two threads add to the same sum.
 //
 // Uses: common.wgsl (LIT_PASS, OUTSIDE, pixel_corner, rn, rn2, sample_count, sample_offset, Vertex,
 // WORKGROUP), one_job.wgsl (batch, frame), geometry/triangle.wgsl (area_of, is_zero, setup_of),

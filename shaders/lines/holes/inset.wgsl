@@ -14,7 +14,7 @@ const NARROW_PX: f32 = 1e-4;
 const LEVEL_PX: f32 = 0.0009765625;
 
 // A side of a face, from a corner to the next, and of its inset.
-struct Side {
+struct InsetSide {
     // The face's corner, 1/256 px from the picture's centre.
     corner: vec2<f32>,
     // Unit vector along, turned so that the inside lies on the same hand for all faces.
@@ -28,7 +28,7 @@ struct Side {
 struct Inset {
     // Pixel of the first corner.
     base: vec2<i32>,
-    sides: array<Side, 3>,
+    sides: array<InsetSide, 3>,
     // 1 or -1: the hand of the face.
     turn: f32,
     is_open: bool,
@@ -57,7 +57,7 @@ fn inset_of(a: vec2<i32>, b: vec2<i32>, c: vec2<i32>) -> Inset {
     let r = inset_corner(-ca, centre, share, corner);
     return Inset(
         (a + half) >> vec2(8u),
-        array<Side, 3>(
+        array<InsetSide, 3>(
             side_of_inset(a, ab, inverse.x * turn, p, q),
             side_of_inset(b, bc, inverse.y * turn, q, r),
             side_of_inset(c, ca, inverse.z * turn, r, p),
@@ -80,12 +80,12 @@ fn inset_corner(from_first: vec2<f32>, centre: vec2<f32>, share: f32, corner: ve
     return rn2((at + corner) * (1.0 / 256.0));
 }
 
-fn side_of_inset(corner: vec2<i32>, along: vec2<f32>, inverse: f32, start: vec2<f32>, end: vec2<f32>) -> Side {
+fn side_of_inset(corner: vec2<i32>, along: vec2<f32>, inverse: f32, start: vec2<f32>, end: vec2<f32>) -> InsetSide {
     let way = end - start;
     let is_narrow = abs(way.x) < NARROW_PX;
     let steep = rn(way.y * recip(select(abs(way.x), 1.0, is_narrow)));
     let slope = select(select(steep, -steep, way.x < 0.0), 0.0, is_narrow);
-    return Side(vec2<f32>(corner), rn2(along * inverse), start, end.x, slope);
+    return InsetSide(vec2<f32>(corner), rn2(along * inverse), start, end.x, slope);
 }
 
 // True if a sample, in 1/256 px from the picture's centre, lies well inside the face.

@@ -1,5 +1,5 @@
-// Stage lines, per triangle: its tips, which are corners in front of all that their pixel shows, of which no sample of
-// the pixel shows the triangle. Twin of src/render/backend/cpu/lines/holes/tips.rs.
+// Stage lines, per triangle: finds tips, corners that are visible though no sample shows their
+// triangle. Twin of src/render/backend/cpu/lines/holes/tips.rs.
 //
 // Uses: common.wgsl (mul_wide, OUTSIDE, rn, sample_count, sub_wide, Vertex, WORKGROUP),
 // one_job.wgsl (batch, frame), geometry/culling.wgsl (passes_culling), geometry/triangle.wgsl

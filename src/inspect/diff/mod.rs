@@ -42,7 +42,7 @@ const ERROR: f64 = 1e-4;
 
 /// A file that was read.
 #[derive(Clone, Copy, Debug)]
-pub struct Side<'a> {
+pub struct ComparedFile<'a> {
     /// Its mesh.
     pub mesh: &'a Mesh,
     /// Its import.
@@ -220,10 +220,10 @@ impl Compared {
     }
 }
 
-/// All that was found, for the words.
-struct Found<'a> {
-    a: Side<'a>,
-    b: Side<'a>,
+/// All that a comparison found, from which the summary in words is written.
+struct Comparison<'a> {
+    a: ComparedFile<'a>,
+    b: ComparedFile<'a>,
     diagonal: f64,
     tolerance: f64,
     /// True if vertices and faces have the same numbers in both.
@@ -240,8 +240,8 @@ struct Found<'a> {
 /// Compares two meshes. `max_distance` is the largest distance that counts as the same, in file units; None: what
 /// encodings round away.
 pub fn compare(
-    a: Side<'_>,
-    b: Side<'_>,
+    a: ComparedFile<'_>,
+    b: ComparedFile<'_>,
     max_distance: Option<f64>,
     budget: &mut Budget,
     deadline: &Deadline,
@@ -279,18 +279,19 @@ pub fn compare(
     let closed_holes = holes::only_in(of_a, of_b, budget)?;
     let materials = materials::compare(a.mesh, b.mesh, &faces.common, budget)?;
     let ways = [there, back];
-    let found = Found { a, b, diagonal, tolerance, has_same_order, faces, parts, whole, new_holes, closed_holes, ways };
+    let found =
+        Comparison { a, b, diagonal, tolerance, has_same_order, faces, parts, whole, new_holes, closed_holes, ways };
     Ok(found.compared(topologies, t_junctions, materials))
 }
 
-impl Found<'_> {
+impl Comparison<'_> {
     fn compared(mut self, topologies: [Topology; 2], t_junctions: [Option<u64>; 2], materials: Materials) -> Compared {
         let [of_a, of_b] =
             [(self.a, &topologies[0]), (self.b, &topologies[1])].map(|(side, topology)| size(side, topology));
         let geometry = self.geometry();
         let is_same_topology = has_same_faults(&topologies[0], &topologies[1]);
         let has_same_attributes = words::lost_attributes(self.a.mesh, self.b.mesh).is_empty();
-        let report = |side: Side<'_>, topology: &Topology, t_junctions: Option<u64>| {
+        let report = |side: ComparedFile<'_>, topology: &Topology, t_junctions: Option<u64>| {
             let degenerate = side.import.dropped_degenerate_faces + side.import.dropped_collapsed_faces;
             TopologyReport::new(topology.clone(), t_junctions, degenerate)
         };
@@ -385,7 +386,7 @@ fn counts(mesh: &Mesh) -> Counts {
     }
 }
 
-fn size(side: Side<'_>, topology: &Topology) -> Size {
+fn size(side: ComparedFile<'_>, topology: &Topology) -> Size {
     let Measures { area, volume } = Measures::of(side.mesh);
     Size { bounds: Bounds::of(side.mesh), area, volume: volume.filter(|_| topology.is_watertight) }
 }

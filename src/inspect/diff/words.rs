@@ -6,7 +6,7 @@ use super::frame::in_file;
 use super::materials::{ChangedMaterial, Materials};
 use super::parts::{Changed, Fate, Part};
 use super::whole::Whole;
-use super::{Difference, Found, OneWay};
+use super::{Comparison, Difference, OneWay};
 use meshsnap_render::mesh::Mesh;
 use meshsnap_render::pluralise::pluralise;
 
@@ -17,7 +17,7 @@ const TOLD_MAX: usize = 5;
 const NAME_CHARS_MAX: usize = 60;
 
 /// The sentences, the most important first.
-pub fn summary(found: &Found<'_>, difference: &Difference) -> Vec<String> {
+pub fn summary(found: &Comparison<'_>, difference: &Difference) -> Vec<String> {
     let mut said = Vec::new();
     geometry(found, difference, &mut said);
     turned(found, &mut said);
@@ -39,7 +39,7 @@ pub fn summary(found: &Found<'_>, difference: &Difference) -> Vec<String> {
 }
 
 /// What is said of the surfaces.
-fn geometry(found: &Found<'_>, difference: &Difference, said: &mut Vec<String>) {
+fn geometry(found: &Comparison<'_>, difference: &Difference, said: &mut Vec<String>) {
     let (a, b) = (found.a.mesh, found.b.mesh);
     let formats = [found.a.import.format.name(), found.b.import.format.name()];
     let in_format = match formats[0] == formats[1] {
@@ -87,7 +87,7 @@ fn of_whole(whole: &Whole) -> String {
 }
 
 /// What is said of parts that are not as they were.
-fn parts(found: &Found<'_>, said: &mut Vec<String>) {
+fn parts(found: &Comparison<'_>, said: &mut Vec<String>) {
     let scale = found.a.mesh.to_file.scale;
     let mut moved: BTreeMap<String, u64> = BTreeMap::new();
     let mut order = Vec::new();
@@ -121,7 +121,7 @@ fn parts(found: &Found<'_>, said: &mut Vec<String>) {
 }
 
 /// What is said of a part that both meshes have with other faces. None where a hole says it.
-fn of_changed(changed: &Changed, found: &Found<'_>) -> Option<String> {
+fn of_changed(changed: &Changed, found: &Comparison<'_>) -> Option<String> {
     let (before, after) = (changed.before.as_ref()?, changed.after.as_ref()?);
     let largest = |part: &Part, way: &Option<OneWay>, scale: f64| {
         let distances = way.as_ref().map_or(&[] as &[f64], |way| &way.of_vertices);
@@ -148,7 +148,7 @@ fn of_changed(changed: &Changed, found: &Found<'_>) -> Option<String> {
 }
 
 /// What is said of faces that look to the other side.
-fn turned(found: &Found<'_>, said: &mut Vec<String>) {
+fn turned(found: &Comparison<'_>, said: &mut Vec<String>) {
     let turned = &found.faces.turned;
     let mesh = found.b.mesh;
     let Some(first) = turned.first() else { return };
@@ -165,7 +165,7 @@ fn turned(found: &Found<'_>, said: &mut Vec<String>) {
     });
 }
 
-fn holes(found: &Found<'_>, said: &mut Vec<String>) {
+fn holes(found: &Comparison<'_>, said: &mut Vec<String>) {
     let new = found.new_holes.iter().map(|hole| {
         let edges = pluralise(hole.edges, "edge", "edges");
         format!("a hole with {edges} near {}", place(hole.at, found.diagonal))
@@ -178,7 +178,7 @@ fn holes(found: &Found<'_>, said: &mut Vec<String>) {
     tell(closed, found.closed_holes.len(), "more holes are closed", said);
 }
 
-fn topology(found: &Found<'_>, difference: &Difference, said: &mut Vec<String>) {
+fn topology(found: &Comparison<'_>, difference: &Difference, said: &mut Vec<String>) {
     let (a, b) = (&difference.topology.a, &difference.topology.b);
     match (a.is_watertight, b.is_watertight) {
         (true, false) => said.push("it is no longer watertight".to_owned()),
@@ -254,7 +254,7 @@ fn parts_in_words(count: u64) -> String {
 }
 
 /// The middle of a part.
-fn near(part: &Part, found: &Found<'_>) -> String {
+fn near(part: &Part, found: &Comparison<'_>) -> String {
     place(in_file(&found.a.mesh.to_file, part.middle), found.diagonal)
 }
 

@@ -26,7 +26,7 @@ impl Context<'_> {
         Ok(crate::limits::check("the number of triangles", count, self.limits.triangles, "--limit-triangles")?)
     }
 
-    /// The number of vertices, of so many, that are not among the `used` ones. None where nobody wants it.
+    /// The number of vertices, of so many, that are not among the `used` ones. None where it is not to be counted.
     pub fn loose(&self, vertices: usize, used: impl Iterator<Item = u32>) -> Result<Option<u64>, MeshError> {
         if !self.counts_loose {
             return Ok(None);

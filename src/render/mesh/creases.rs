@@ -48,7 +48,7 @@ const BYTES_PER_CORNER: u64 = 4 + 12;
 
 /// Further memory per corner that is worked on, bytes: edges, sets and an order at a position; then at worst
 /// a side of its own, in lists that double as they grow.
-const WORKING_BYTES_PER_CORNER: u64 = 16 + 4 + 8 + 2 * (4 + size_of::<Side>() as u64);
+const WORKING_BYTES_PER_CORNER: u64 = 16 + 4 + 8 + 2 * (4 + size_of::<CreaseSide>() as u64);
 
 /// Positions that a thread takes at a time.
 const PIECE: usize = 1 << 10;
@@ -119,11 +119,11 @@ struct Faces<'a> {
 struct Sides {
     /// Corners, `3 * triangle + corner`, side by side.
     corners: Vec<u32>,
-    sides: Vec<Side>,
+    sides: Vec<CreaseSide>,
 }
 
 /// The corners at a position on one side of its creases.
-struct Side {
+struct CreaseSide {
     /// The end of its corners in [`Sides::corners`]; they begin where those of the side before end.
     end: u32,
     normal: [f32; 3],
@@ -161,7 +161,7 @@ impl CreasedNormals {
         Ok(())
     }
 
-    fn add_side(&mut self, side: &Side, corners: &[u32], triangles: &[[u32; 3]]) {
+    fn add_side(&mut self, side: &CreaseSide, corners: &[u32], triangles: &[[u32; 3]]) {
         let place_of = |corner: u32| (corner as usize / 3, corner as usize % 3);
         let Some((triangle, k)) = corners.first().map(|&corner| place_of(corner)) else { return };
         if side.is_first {
@@ -301,7 +301,7 @@ impl Faces<'_> {
             let start = found.corners.len();
             found.corners.extend(side.iter().map(|&(_, corner)| corner));
             let normal = self.normal(&found.corners[start..]);
-            found.sides.push(Side { end: found.corners.len() as u32, normal, is_first: i == 0 });
+            found.sides.push(CreaseSide { end: found.corners.len() as u32, normal, is_first: i == 0 });
         }
     }
 

@@ -37,7 +37,7 @@ pub use build::{build, build_from, build_keeping};
 pub use error::PlanError;
 pub use framing::framing;
 pub use heat::Legend;
-pub use lines::{Edge, LinePass, Shown, Side};
+pub use lines::{Edge, FaceSide, LinePass, Shown};
 pub use outline::{HullPass, HullVertex};
 pub use peeling::{ALPHA_MIN, PeelingPass, TINTS, pass_mask};
 pub use prepared::{MeshToken, Prepared};

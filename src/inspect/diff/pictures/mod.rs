@@ -243,7 +243,7 @@ pub fn heat(a: &Picture, b: &Picture, tolerance: Tolerance) -> Option<Image> {
 pub fn flip_heat(a: &Picture, b: &Picture) -> Option<Image> {
     let Flip { errors, .. } = flip(a, b)?;
     let color = |(error, now): (&f32, &[u16; 4])| {
-        // Below this nobody sees a difference.
+        // A smaller error is not visible.
         if *error < 0.02 {
             return pale(*now);
         }

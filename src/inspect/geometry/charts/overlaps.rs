@@ -96,7 +96,7 @@ pub fn overlaps(mesh: &Mesh, budget: &Budget, deadline: &Deadline) -> Result<Opt
 }
 
 /// A face and those that it overlaps.
-struct Found {
+struct FaceOverlap {
     is_overlapping: bool,
     /// The area that no earlier face covers.
     first: f64,
@@ -124,13 +124,13 @@ impl Search<'_> {
     }
 
     /// The overlaps of a face; none if there are too many of them.
-    fn face(&self, place: usize) -> Result<Option<Found>, Stopped> {
+    fn face(&self, place: usize) -> Result<Option<FaceOverlap>, Stopped> {
         let face = self.tree.face(place);
         let own = uvs(self.mesh, face);
         let whole = twice_area(own).abs() / 2.0;
         let Some(mut others) = self.partners(place, own)? else { return Ok(None) };
         if others.is_empty() {
-            return Ok(Some(Found { is_overlapping: false, first: whole, alone: whole, error: 0.0 }));
+            return Ok(Some(FaceOverlap { is_overlapping: false, first: whole, alone: whole, error: 0.0 }));
         }
         others.sort_unstable();
         let (earlier, later) = others.split_at(others.partition_point(|other| *other < face));
@@ -142,7 +142,7 @@ impl Search<'_> {
         if !self.take(&mut left, later)? {
             return Ok(None);
         }
-        Ok(Some(Found { is_overlapping: true, first, alone: left.area(), error: 2.0 * left.error() }))
+        Ok(Some(FaceOverlap { is_overlapping: true, first, alone: left.area(), error: 2.0 * left.error() }))
     }
 
     /// Takes away what other faces cover. False if that takes too long.

@@ -28,7 +28,7 @@ mod vector;
 
 pub use isa::Isa;
 pub use threads::DrawingThreads;
-use threads::Share;
+use threads::ThreadShare;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -245,7 +245,7 @@ impl CpuRenderer {
         context: &RasterContext<'_>,
         pass: &OcclusionPass,
         (occlusion, kept): (&mut Occlusion, &mut KeptSamples),
-        (share, banding, bins): (&Share<'_>, Banding, &Bins),
+        (share, banding, bins): (&ThreadShare<'_>, Banding, &Bins),
     ) {
         let plan = context.plan;
         occlusion.grid.reset(pass, [plan.width_px, plan.height_px]);

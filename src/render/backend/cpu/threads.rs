@@ -20,7 +20,7 @@ pub struct DrawingThreads {
 }
 
 /// The part of the threads that one picture has. It ends when this is dropped.
-pub struct Share<'a> {
+pub struct ThreadShare<'a> {
     threads: &'a DrawingThreads,
     /// Their number, at least 1.
     pub count: usize,
@@ -50,9 +50,9 @@ impl DrawingThreads {
     }
 
     /// Begins a picture.
-    pub fn share(&self) -> Share<'_> {
+    pub fn share(&self) -> ThreadShare<'_> {
         self.drawing.fetch_add(1, Ordering::Relaxed);
-        Share { threads: self, count: self.part() }
+        ThreadShare { threads: self, count: self.part() }
     }
 
     /// Threads for each of the pictures that are being drawn now.
@@ -61,7 +61,7 @@ impl DrawingThreads {
     }
 }
 
-impl<'a> Share<'a> {
+impl<'a> ThreadShare<'a> {
     /// The pool to draw on; None: the caller's thread alone.
     pub fn pool(&self) -> Option<&'a ThreadPool> {
         self.threads.pool.as_ref().filter(|_| self.count > 1)
@@ -88,7 +88,7 @@ impl<'a> Share<'a> {
     }
 }
 
-impl Drop for Share<'_> {
+impl Drop for ThreadShare<'_> {
     fn drop(&mut self) {
         self.threads.drawing.fetch_sub(1, Ordering::Relaxed);
     }

@@ -32,12 +32,12 @@ pub use self::schedule::sizes::bands_bytes;
 pub use crate::backend::{GpuInfo, GpuKind};
 
 use self::buffers::Buffers;
-use self::gang::{Seat as _, Share, Turn, may_share};
+use self::gang::{GangShare, Seat as _, Turn, may_share};
 use self::params::{attributes, corner_triangles, edge_lists, hull_materials, sample_masks, texture_table};
 use self::pipelines::Slot;
 use self::pipelines::key::pipeline_key;
 use self::recorder::Recorder;
-use self::residents::{Found, Source};
+use self::residents::{ListLookup, Source};
 use self::schedule::Schedule;
 use self::schedule::sizes::{
     DeviceTraits, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, is_painted,
@@ -66,12 +66,12 @@ fn make_pipelines_of_gangs(gpu: &Gpu, plan: &DrawPlan<'_>) -> Result<(), DrawErr
 }
 
 /// The plan's schedule and share, if it can be drawn in a gang.
-fn share_of(gpu: &Gpu, plan: &DrawPlan<'_>) -> Result<Option<(Schedule, Share)>, DrawError> {
+fn share_of(gpu: &Gpu, plan: &DrawPlan<'_>) -> Result<Option<(Schedule, GangShare)>, DrawError> {
     if !gpu.handles.maps_storage || !may_share(plan) {
         return Ok(None);
     }
     let schedule = Schedule::new(plan, &DeviceTraits { maps_pictures: true, ..traits(gpu) }, Goal::Picture)?;
-    Ok(Share::of(plan, &schedule).map(|share| (schedule, share)))
+    Ok(GangShare::of(plan, &schedule).map(|share| (schedule, share)))
 }
 
 /// Workgroups that share the large triangles: enough to fill a large GPU.
@@ -290,7 +290,7 @@ impl GpuRenderer {
     /// Draws plans in one gang, for tests that compare that with drawing them one by one. None if they cannot share
     /// dispatches.
     pub fn draw_together(&mut self, plans: &[&DrawPlan<'_>]) -> Result<Option<Vec<Pixels>>, DrawError> {
-        let mut shares: Vec<Share> = Vec::new();
+        let mut shares: Vec<GangShare> = Vec::new();
         for plan in plans {
             let Some((_, share)) = share_of(&self.gpu, plan)? else { return Ok(None) };
             if shares.first().is_some_and(|first| !first.is_alike(&share)) || shares.len() == share.gang_max() {
@@ -305,7 +305,7 @@ impl GpuRenderer {
         Ok(Some((0..shares.len()).map(|job| pictures.rgba(job)).collect()))
     }
 
-    /// Waits for the job's turn among those that are alike. None if it is to be drawn alone, whoever else is drawn.
+    /// Waits for the job's turn among those that are alike. None if it is to be drawn alone.
     fn turn(&self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Option<Drawn<'_>>, DrawError> {
         let Some((schedule, share)) = share_of(&self.gpu, plan)? else { return Ok(None) };
         let drawn = match self.gpu.gangs.turn(share, deadline)? {
@@ -328,7 +328,7 @@ enum Drawn<'a> {
     /// The pixels of its picture.
     InGang(Pixels),
     /// It is to be drawn alone, before this is dropped.
-    Alone(gang::Leading<'a, Share, gang::Pictures>),
+    Alone(gang::Leading<'a, GangShare, gang::Pictures>),
 }
 
 fn traits(gpu: &Gpu) -> DeviceTraits {
@@ -354,13 +354,13 @@ fn supply(
 ) -> Result<(), DrawError> {
     if let Some(source) = &source {
         let buffer = match gpu.residents.find(slot, source) {
-            Found::Buffer(buffer) => Some(buffer),
-            Found::Wanted => {
+            ListLookup::Buffer(buffer) => Some(buffer),
+            ListLookup::Wanted => {
                 let buffer = Buffers::filled(&gpu.handles, parts)?;
                 buffers.keep_later(slot, source, &buffer);
                 Some(buffer)
             }
-            Found::Unwanted => None,
+            ListLookup::Unwanted => None,
         };
         if let Some(buffer) = buffer {
             buffers.bind(slot, buffer);

@@ -127,7 +127,7 @@ pub struct Batch {
 
 /// Bits of [`Batch::line_flags`].
 pub mod line_flags {
-    use crate::plan::{DrawPlan, LinePass, Shown, Side};
+    use crate::plan::{DrawPlan, FaceSide, LinePass, Shown};
 
     /// Only what nothing hides is drawn.
     pub const SHOWN_VISIBLE: u32 = 1;
@@ -166,7 +166,7 @@ pub mod line_flags {
             | when(lines.unseen_side.is_some(), SKIP_BACK)
             | when(lines.contour, CONTOUR)
             | when(lines.lit && plan.lights_lines(), LIT_PASS)
-            | when(lines.unseen_side == Some(Side::Front), INSIDE_OUT)
+            | when(lines.unseen_side == Some(FaceSide::Front), INSIDE_OUT)
             | when(plan.tints(lines), TINTED_PASS)
             | when(plan.names_all_faces, NAMES_ALL_FACES)
     }

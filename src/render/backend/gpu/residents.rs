@@ -90,7 +90,7 @@ struct Entry<B> {
 
 /// The answer for a list.
 #[derive(Debug, PartialEq, Eq)]
-pub enum Found<B> {
+pub enum ListLookup<B> {
     /// Its buffer.
     Buffer(B),
     /// None yet, and there is to be one.
@@ -107,26 +107,26 @@ impl<B: Clone> ResidentBuffers<B> {
     }
 
     /// The buffer of a list.
-    pub fn find(&self, slot: Slot, source: &Source) -> Found<B> {
+    pub fn find(&self, slot: Slot, source: &Source) -> ListLookup<B> {
         let key = source.key(slot);
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         kept.now += 1;
         let now = kept.now;
         if let Some(entry) = kept.buffers.get_mut(&key) {
             entry.used = now;
-            return Found::Buffer(entry.buffer.clone());
+            return ListLookup::Buffer(entry.buffer.clone());
         }
         if source.bytes == 0 || source.bytes > self.bytes_max {
-            return Found::Unwanted;
+            return ListLookup::Unwanted;
         }
         if kept.asked_once.iter().any(|(asked, _)| *asked == key) {
-            return Found::Wanted;
+            return ListLookup::Wanted;
         }
         if kept.asked_once.len() == ASKED_ONCE_MAX {
             kept.asked_once.pop_front();
         }
         kept.asked_once.push_back((key, source.owner.clone()));
-        Found::Unwanted
+        ListLookup::Unwanted
     }
 
     /// Keeps the buffer of a list. Buffers whose list is gone are dropped first, then those that were used
@@ -200,19 +200,19 @@ mod tests {
         let residents = ResidentBuffers::new(100);
         let (a, _own) = list(60);
         let a = source(&a);
-        assert_eq!(residents.find(Slot::Positions, &a), Found::Unwanted);
-        assert_eq!(residents.find(Slot::Uvs, &a), Found::Unwanted, "another slot has another form");
-        assert_eq!(residents.find(Slot::Positions, &a), Found::Wanted);
+        assert_eq!(residents.find(Slot::Positions, &a), ListLookup::Unwanted);
+        assert_eq!(residents.find(Slot::Uvs, &a), ListLookup::Unwanted, "another slot has another form");
+        assert_eq!(residents.find(Slot::Positions, &a), ListLookup::Wanted);
         residents.keep(Slot::Positions, &a, 6);
         residents.keep(Slot::Positions, &a, 7);
         assert_eq!(bytes(&residents), (1, 60), "two jobs may keep one list");
-        assert_eq!(residents.find(Slot::Positions, &a), Found::Buffer(7));
+        assert_eq!(residents.find(Slot::Positions, &a), ListLookup::Buffer(7));
         let (large, _own) = list(101);
         let large = source(&large);
-        assert_eq!(residents.find(Slot::Uvs, &large), Found::Unwanted);
-        assert_eq!(residents.find(Slot::Uvs, &large), Found::Unwanted, "it has no room");
+        assert_eq!(residents.find(Slot::Uvs, &large), ListLookup::Unwanted);
+        assert_eq!(residents.find(Slot::Uvs, &large), ListLookup::Unwanted, "it has no room");
         assert!(residents.clear() && !residents.clear());
-        assert_eq!(residents.find(Slot::Positions, &a), Found::Wanted);
+        assert_eq!(residents.find(Slot::Positions, &a), ListLookup::Wanted);
         assert_eq!(bytes(&residents), (0, 0));
     }
 
@@ -225,7 +225,7 @@ mod tests {
             residents.find(Slot::Positions, &sources[i]);
             residents.keep(Slot::Positions, &sources[i], i as u32);
         };
-        let found = |i: usize| residents.find(Slot::Positions, &sources[i]) == Found::Buffer(i as u32);
+        let found = |i: usize| residents.find(Slot::Positions, &sources[i]) == ListLookup::Buffer(i as u32);
         keep(0);
         keep(1);
         assert!(found(1) && found(0));
@@ -249,7 +249,7 @@ mod tests {
         drop((first, own));
         residents.find(Slot::Positions, &source(&third));
         residents.keep(Slot::Positions, &source(&third), 3);
-        assert_eq!(residents.find(Slot::Positions, &source(&second)), Found::Buffer(1));
+        assert_eq!(residents.find(Slot::Positions, &source(&second)), ListLookup::Buffer(1));
         assert_eq!(bytes(&residents), (2, 100));
     }
 

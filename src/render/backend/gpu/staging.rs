@@ -20,7 +20,7 @@ pub struct ReadbackPool(Mutex<Spare>);
 struct Spare {
     /// The oldest first.
     buffers: Vec<wgpu::Buffer>,
-    /// True from when a job takes one until nobody draws any more: then buffers are kept.
+    /// True from the first job that takes a buffer until no job draws any more. Buffers are kept while it is true.
     is_open: bool,
 }
 

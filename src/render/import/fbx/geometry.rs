@@ -99,7 +99,7 @@ impl Part {
         raw: &mut RawMesh,
         cx: &mut Context<'_>,
     ) -> Result<(), MeshError> {
-        let place = Place::of(&node.geometry_to_world);
+        let place = Placement::of(&node.geometry_to_world);
         let attributes = Attributes::of(mesh);
         raw.report.file_vertices += mesh.vertices.len() as u64;
         raw.report.add_loose(cx.loose(mesh.vertices.len(), mesh.vertex_position.indices.iter().copied())?);
@@ -151,7 +151,7 @@ fn curves(
     for curve in &scene.line_curves {
         for node in curve.element.instances.into_iter().filter(|node| visibilities.at(node) == Visibility::Shown) {
             cx.deadline.check()?;
-            let place = Place::of(&node.geometry_to_world);
+            let place = Placement::of(&node.geometry_to_world);
             let base = raw.positions.len();
             let (points, indices) = (curve.control_points.len(), curve.point_indices.len());
             let lines = (raw.lines_and_points.len() + indices) as u64;
@@ -200,13 +200,14 @@ fn broken(mesh: &Mesh, face: usize) -> MeshError {
     MeshError::broken(format!("face {face} of the FBX mesh \"{name}\" refers to a vertex that is not there"))
 }
 
-struct Place {
+/// The matrix that puts a mesh into the scene, for points and for normals.
+struct Placement {
     points: Affine,
     normals: [[f64; 3]; 3],
     is_mirroring: bool,
 }
 
-impl Place {
+impl Placement {
     fn of(m: &Matrix) -> Self {
         let rows = [[m.m00, m.m01, m.m02], [m.m10, m.m11, m.m12], [m.m20, m.m21, m.m22]];
         let points = Affine { linear: rounded(rows), translation: [m.m03, m.m13, m.m23] };
@@ -272,7 +273,7 @@ impl<'a> Attributes<'a> {
             + missing(self.has_colors, raw.colors.is_empty(), 16)
     }
 
-    fn push(&self, [position, normal, uv, color]: [u32; 4], place: &Place, raw: &mut RawMesh) -> Option<()> {
+    fn push(&self, [position, normal, uv, color]: [u32; 4], place: &Placement, raw: &mut RawMesh) -> Option<()> {
         let p = self.mesh.vertex_position.values.get(position as usize)?;
         raw.positions.push(place.points.point([p.x, p.y, p.z]));
         if self.has_normals {

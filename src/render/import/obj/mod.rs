@@ -20,7 +20,7 @@ pub use sniff::is_obj;
 use self::assemble::{Room, Summary, assemble};
 use self::cut::PART_BYTES;
 use self::face::Counts;
-use self::parse::{Fault, Part, Places, Rules, parse};
+use self::parse::{Part, PartError, Places, Rules, parse};
 use super::raw::RawMesh;
 use super::{Format, MeshError, text};
 use crate::import::FileMetadata;
@@ -79,7 +79,7 @@ fn read_text(
     let mut parts = parallel::map(tasks, |(i, (piece, places))| {
         parse(piece, places, Rules { before: (i == 0).then(Counts::default), ..rules })
     });
-    if parts.iter().any(|part| matches!(part, Err(Fault::NeedsCounts))) {
+    if parts.iter().any(|part| matches!(part, Err(PartError::NeedsCounts))) {
         parts = with_counts(&pieces, parts, rules);
     }
     let mut lines_before = 0;
@@ -95,9 +95,9 @@ fn read_text(
 /// Parses the parts again that need the counts of those before them.
 fn with_counts<'t>(
     pieces: &[&'t [u8]],
-    parts: Vec<Result<Part<'t>, Fault>>,
+    parts: Vec<Result<Part<'t>, PartError>>,
     rules: Rules<'_>,
-) -> Vec<Result<Part<'t>, Fault>> {
+) -> Vec<Result<Part<'t>, PartError>> {
     let counts = parallel::map(parts.iter().zip(pieces).collect(), |(part, piece)| match part {
         Ok(part) => part.counts(),
         Err(_) => parse::count(piece, rules.newline, || rules.deadline.check().is_ok()),
@@ -109,7 +109,7 @@ fn with_counts<'t>(
         sum = sum + own;
     }
     parallel::map(parts.into_iter().zip(pieces).zip(befores).collect(), |((part, piece), before)| match part {
-        Err(Fault::NeedsCounts) => parse(piece, Places::default(), Rules { before: Some(before), ..rules }),
+        Err(PartError::NeedsCounts) => parse(piece, Places::default(), Rules { before: Some(before), ..rules }),
         other => other,
     })
 }

@@ -122,7 +122,7 @@ impl<const BIG: bool> Source for Binary<'_, BIG> {
         let count = records as usize;
         let before = corners.len();
         if before == 0 {
-            // Zeros from the system, which nobody has to write.
+            // Memory from the system is zero, so nothing has to be written.
             *corners = vec![0; 3 * count];
         } else {
             corners.resize(before + 3 * count, 0);

@@ -122,15 +122,15 @@ pub fn each_record_from<S: Source>(
         }
         let begin = source.at();
         read_record(source, layout, &mut row, cx).map_err(|fault| match fault {
-            Fault::NoValue => {
+            RecordError::NoValue => {
                 let (place, why) = (source.place(source.at()), source.why());
                 MeshError::broken(format!("{place}: {why} {}", name(element, number)))
             }
-            Fault::Says(what) => {
+            RecordError::Says(what) => {
                 let place = source.place(begin);
                 MeshError::broken(format!("{place}: {} {what}", name(element, number)))
             }
-            Fault::Is(error) => *error,
+            RecordError::Is(error) => *error,
         })?;
         // Paid before anything is kept, because one list may be the whole file.
         let items = row.lists.iter().map(|list| list.len() as u64).sum::<u64>();
@@ -176,7 +176,7 @@ fn name(element: &Element, number: u64) -> String {
 }
 
 /// Errors of reading a record. Small, because it goes through hot loops.
-enum Fault {
+enum RecordError {
     /// No next number; the source knows why.
     NoValue,
     /// A fault, as the sentence after the record's name.
@@ -185,13 +185,18 @@ enum Fault {
     Is(Box<MeshError>),
 }
 
-fn read_record<S: Source>(source: &mut S, layout: &Layout, row: &mut Row, cx: &mut Context<'_>) -> Result<(), Fault> {
+fn read_record<S: Source>(
+    source: &mut S,
+    layout: &Layout,
+    row: &mut Row,
+    cx: &mut Context<'_>,
+) -> Result<(), RecordError> {
     for step in &layout.steps {
         match *step {
-            Step::Skip { numbers, bytes } => source.skip(numbers, bytes).ok_or(Fault::NoValue)?,
-            Step::Value { kind, slot, .. } => row.values[slot] = source.value(kind).ok_or(Fault::NoValue)?,
+            Step::Skip { numbers, bytes } => source.skip(numbers, bytes).ok_or(RecordError::NoValue)?,
+            Step::Value { kind, slot, .. } => row.values[slot] = source.value(kind).ok_or(RecordError::NoValue)?,
             Step::List { count, item, slot } => {
-                let given = source.value(count).ok_or(Fault::NoValue)?;
+                let given = source.value(count).ok_or(RecordError::NoValue)?;
                 let count = list_length(source, given, item)?;
                 match slot {
                     Some(slot) => read_list(source, item, count, &mut row.lists[slot], cx)?,
@@ -204,14 +209,14 @@ fn read_record<S: Source>(source: &mut S, layout: &Layout, row: &mut Row, cx: &m
 }
 
 /// A count of items, checked against the rest of the file.
-fn list_length<S: Source>(source: &S, given: f64, item: Kind) -> Result<usize, Fault> {
+fn list_length<S: Source>(source: &S, given: f64, item: Kind) -> Result<usize, RecordError> {
     let count = given as u32;
     if f64::from(count) != given {
-        return Err(Fault::Says(format!("has a list of {given} items").into()));
+        return Err(RecordError::Says(format!("has a list of {given} items").into()));
     }
     if u64::from(count) > source.numbers_left(item) {
         let left = source.trailing_bytes();
-        return Err(Fault::Says(format!("has a list of {count} items, and only {left} bytes follow").into()));
+        return Err(RecordError::Says(format!("has a list of {count} items, and only {left} bytes follow").into()));
     }
     Ok(count as usize)
 }
@@ -222,7 +227,7 @@ fn read_list<S: Source>(
     count: usize,
     list: &mut Vec<f64>,
     cx: &mut Context<'_>,
-) -> Result<(), Fault> {
+) -> Result<(), RecordError> {
     list.clear();
     if count > list.capacity() {
         let more = (count - list.capacity()) as u64;
@@ -232,16 +237,16 @@ fn read_list<S: Source>(
     in_pieces(count, cx, |piece| source.values(item, piece, list))
 }
 
-fn skip_list<S: Source>(source: &mut S, item: Kind, count: usize, cx: &Context<'_>) -> Result<(), Fault> {
+fn skip_list<S: Source>(source: &mut S, item: Kind, count: usize, cx: &Context<'_>) -> Result<(), RecordError> {
     in_pieces(count, cx, |piece| source.skip(piece, piece * item.bytes()))
 }
 
 /// Calls `read` in pieces, with a deadline check between them.
-fn in_pieces(count: usize, cx: &Context<'_>, mut read: impl FnMut(usize) -> Option<()>) -> Result<(), Fault> {
+fn in_pieces(count: usize, cx: &Context<'_>, mut read: impl FnMut(usize) -> Option<()>) -> Result<(), RecordError> {
     let mut left = count;
     loop {
         let piece = left.min(RECORDS_PER_POLL as usize);
-        read(piece).ok_or(Fault::NoValue)?;
+        read(piece).ok_or(RecordError::NoValue)?;
         left -= piece;
         if left == 0 {
             return Ok(());
@@ -250,8 +255,8 @@ fn in_pieces(count: usize, cx: &Context<'_>, mut read: impl FnMut(usize) -> Opti
     }
 }
 
-fn boxed(error: impl Into<MeshError>) -> Fault {
-    Fault::Is(Box::new(error.into()))
+fn boxed(error: impl Into<MeshError>) -> RecordError {
+    RecordError::Is(Box::new(error.into()))
 }
 
 impl Meter {

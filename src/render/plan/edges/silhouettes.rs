@@ -8,7 +8,7 @@ use crate::mesh::edges::{EdgeList, MeshEdge};
 use crate::mesh::topology::Orientation;
 use crate::mesh::vector::{cross, dot};
 use crate::plan::cut_outs::MaskedFaces;
-use crate::plan::{Edge, Side};
+use crate::plan::{Edge, FaceSide};
 use crate::scene::{Fill, MaterialGroups};
 use crate::spec::{Cull, Layers};
 
@@ -126,10 +126,10 @@ pub fn hides_inside(groups: &MaterialGroups<'_>) -> bool {
 }
 
 /// The side that no face shows: the inside of a closed, opaque surface that is seen from outside.
-pub fn unseen_side(groups: &MaterialGroups<'_>, orientation: Orientation) -> Option<Side> {
+pub fn unseen_side(groups: &MaterialGroups<'_>, orientation: Orientation) -> Option<FaceSide> {
     let (unseen, culled) = match orientation {
-        Orientation::Outward => (Side::Back, Cull::Front),
-        Orientation::Inward => (Side::Front, Cull::Back),
+        Orientation::Outward => (FaceSide::Back, Cull::Front),
+        Orientation::Inward => (FaceSide::Front, Cull::Back),
         Orientation::Mixed => return None,
     };
     let is_drawn = |layers: &&Layers| layers.surface.is_none_or(|s| s.cull != culled);

@@ -37,7 +37,7 @@ pub struct LinePass {
     /// The side of all faces that lies inside a closed surface, on which every edge has two faces that run
     /// along it in opposite directions. An edge is left out if all its faces show this side to the viewer.
     /// None: no edge is left out for this reason.
-    pub unseen_side: Option<Side>,
+    pub unseen_side: Option<FaceSide>,
     /// True if only this view's silhouette edges are drawn: edges whose faces all lie on one side
     /// of them on screen.
     pub contour: bool,
@@ -198,7 +198,7 @@ impl DrawPlan<'_> {
 
 /// A side of a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum FaceSide {
     /// The side from which its corners run counter-clockwise.
     Front,
     /// The side from which its corners run clockwise.

@@ -10,7 +10,7 @@ use crate::plan::context::PlanContext;
 use crate::plan::edges::edge_class::{Class, belongs_to, class_of};
 use crate::plan::lines::auto_width::{AutoWidth, open_edges};
 use crate::plan::peeling::FADE;
-use crate::plan::{Edge, LinePass, PlanError, Shown, Side};
+use crate::plan::{Edge, FaceSide, LinePass, PlanError, Shown};
 use crate::scene::{MaterialGroups, Scene};
 use crate::spec::color::Rgba;
 use crate::spec::{Hidden, OutlineMethod, Topology, Wire, WireEdges, WireMethod, WireThickness};
@@ -98,7 +98,7 @@ impl LineStyle {
     }
 
     /// The passes that draw these edges, those of hidden parts first.
-    pub fn passes(&self, edges: &Arc<Vec<Edge>>, hides: bool, unseen_side: Option<Side>) -> Vec<LinePass> {
+    pub fn passes(&self, edges: &Arc<Vec<Edge>>, hides: bool, unseen_side: Option<FaceSide>) -> Vec<LinePass> {
         let pass = |shown, color| LinePass {
             edges: edges.clone(),
             is_complete: self.has_all_edges,

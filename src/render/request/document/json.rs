@@ -4,7 +4,7 @@ use serde_json::Value as Json;
 
 use super::item::Item;
 use crate::request::document::duplicate_keys;
-use crate::request::document::unique_keys::{Fault, parse};
+use crate::request::document::unique_keys::{DocumentError, parse};
 use crate::request::error::{RequestError, RequestFault};
 use crate::request::table::value::Given;
 use crate::request::table::{self, MATERIALS, SCHEMA};
@@ -19,13 +19,15 @@ pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<Item>, RequestErro
         return Err(not_json(format!("{} bytes long", document.len()), format!("{DOCUMENT_BYTES_MAX} bytes")));
     }
     let json = parse(document, depth_max).map_err(|fault| match fault {
-        Fault::TooDeep(depth) => {
+        DocumentError::TooDeep(depth) => {
             let error = not_json(format!("nested {depth} deep"), format!("a depth of {depth_max}"));
             RequestError { flag: Some("--limit-json-depth"), ..error }
         }
-        Fault::NotJson(_) if document.trim_ascii().is_empty() => not_json("empty".into(), "a JSON object".into()),
-        Fault::NotJson(e) => not_json(not_json_at(&e), String::new()),
-        Fault::Repeated(key) => repeated(&key),
+        DocumentError::NotJson(_) if document.trim_ascii().is_empty() => {
+            not_json("empty".into(), "a JSON object".into())
+        }
+        DocumentError::NotJson(e) => not_json(not_json_at(&e), String::new()),
+        DocumentError::Repeated(key) => repeated(&key),
     })?;
     let Json::Object(object) = json else {
         return Err(not_json(Given::Json(json).show(), "a JSON object".into()));
@@ -66,9 +68,9 @@ pub fn flatten_override(key: &str, text: &str, depth_max: u64) -> Result<Vec<Ite
         RequestError::new(RequestFault::WrongType, &whole, item.given.show(), allowed)
     };
     let value = parse(text.as_bytes(), depth_max).map_err(|fault| match fault {
-        Fault::TooDeep(_) => wrong(format!(", at most {depth_max} deep")),
-        Fault::NotJson(e) => wrong(format!("; this is {}", not_json_at(&e))),
-        Fault::Repeated(key) => repeated(&format!("{whole}.{key}")),
+        DocumentError::TooDeep(_) => wrong(format!(", at most {depth_max} deep")),
+        DocumentError::NotJson(e) => wrong(format!("; this is {}", not_json_at(&e))),
+        DocumentError::Repeated(key) => repeated(&format!("{whole}.{key}")),
     })?;
     let mut items = Vec::new();
     match item.material {

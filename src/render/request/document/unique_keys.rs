@@ -8,7 +8,7 @@ use serde::de::{DeserializeSeed, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value as Json};
 
 /// The reason why a document is refused.
-pub enum Fault {
+pub enum DocumentError {
     /// It is nested this deep.
     TooDeep(u64),
     /// It is not JSON.
@@ -19,29 +19,29 @@ pub enum Fault {
 }
 
 /// Parses a document of at most this depth.
-pub fn parse(document: &[u8], depth_max: u64) -> Result<Json, Fault> {
+pub fn parse(document: &[u8], depth_max: u64) -> Result<Json, DocumentError> {
     // Checked before the parser runs, because it is recursive.
     let depth = depth(document);
     if depth > depth_max {
-        return Err(Fault::TooDeep(depth));
+        return Err(DocumentError::TooDeep(depth));
     }
     let mut repeated = None;
     let mut parser = serde_json::Deserializer::from_slice(document);
-    let parsed = Place { path: "", repeated: &mut repeated }.deserialize(&mut parser);
+    let parsed = KeySearch { path: "", repeated: &mut repeated }.deserialize(&mut parser);
     match (parsed.and_then(|json| parser.end().map(|()| json)), repeated) {
-        (_, Some(key)) => Err(Fault::Repeated(key)),
+        (_, Some(key)) => Err(DocumentError::Repeated(key)),
         (Ok(json), None) => Ok(json),
-        (Err(error), None) => Err(Fault::NotJson(error)),
+        (Err(error), None) => Err(DocumentError::NotJson(error)),
     }
 }
 
-/// The path of the value that is read, and the place for the first duplicate key.
-struct Place<'a> {
+/// A search for duplicate keys: the path of the value that is read, and the first duplicate key.
+struct KeySearch<'a> {
     path: &'a str,
     repeated: &'a mut Option<String>,
 }
 
-impl<'de> DeserializeSeed<'de> for Place<'_> {
+impl<'de> DeserializeSeed<'de> for KeySearch<'_> {
     type Value = Json;
 
     fn deserialize<D: Deserializer<'de>>(self, parser: D) -> Result<Json, D::Error> {
@@ -58,7 +58,7 @@ macro_rules! plain {
     };
 }
 
-impl<'de> Visitor<'de> for Place<'_> {
+impl<'de> Visitor<'de> for KeySearch<'_> {
     type Value = Json;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -73,7 +73,7 @@ impl<'de> Visitor<'de> for Place<'_> {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Json, A::Error> {
         let mut values = Vec::new();
-        while let Some(value) = list.next_element_seed(Place { path: self.path, repeated: self.repeated })? {
+        while let Some(value) = list.next_element_seed(KeySearch { path: self.path, repeated: self.repeated })? {
             values.push(value);
         }
         Ok(Json::Array(values))
@@ -87,7 +87,7 @@ impl<'de> Visitor<'de> for Place<'_> {
                 *self.repeated = Some(path);
                 return Err(A::Error::custom("a key twice"));
             }
-            let value = object.next_value_seed(Place { path: &path, repeated: self.repeated })?;
+            let value = object.next_value_seed(KeySearch { path: &path, repeated: self.repeated })?;
             values.insert(key, value);
         }
         Ok(Json::Object(values))
@@ -150,7 +150,7 @@ mod tests {
         }
         assert_eq!(cases, 10);
         for text in ["", "{", "[1,]", "1 2", "{\"a\":1}}", "nul", "\"\u{1}\"", "1e999"] {
-            assert!(matches!(parse(text.as_bytes(), 128), Err(Fault::NotJson(_))), "{text}");
+            assert!(matches!(parse(text.as_bytes(), 128), Err(DocumentError::NotJson(_))), "{text}");
         }
     }
 
@@ -165,7 +165,10 @@ mod tests {
             (r#"{"":1,"":2}"#, ""),
         ];
         for (text, key) in cases {
-            assert!(matches!(parse(text.as_bytes(), 128), Err(Fault::Repeated(named)) if named == key), "{text}");
+            assert!(
+                matches!(parse(text.as_bytes(), 128), Err(DocumentError::Repeated(named)) if named == key),
+                "{text}"
+            );
         }
     }
 }

@@ -43,7 +43,7 @@ pub struct Section {
 }
 
 /// A type of [`Draft`]'s fields that a key can set.
-pub trait Place: Sized + 'static {
+pub trait FieldValue: Sized + 'static {
     /// True if `null` is a value.
     const NULLABLE: bool = false;
 
@@ -56,7 +56,7 @@ pub trait Place: Sized + 'static {
 
 impl Field {
     /// A key and the place in a draft that it sets.
-    pub fn new<T: Place>(key: &'static str, place: fn(&mut Draft) -> &mut T, about: impl Into<String>) -> Self {
+    pub fn new<T: FieldValue>(key: &'static str, place: fn(&mut Draft) -> &mut T, about: impl Into<String>) -> Self {
         let set = move |draft: &mut Draft, value| {
             if let Some(value) = T::of(value) {
                 *place(draft) = value;
@@ -79,7 +79,7 @@ impl Field {
 
 macro_rules! places {
     ($($type:ty: $kind:expr, $pattern:pat => $result:expr;)*) => {
-        $(impl Place for $type {
+        $(impl FieldValue for $type {
             fn kind() -> Kind {
                 $kind
             }
@@ -102,7 +102,7 @@ places! {
     bool: Kind::Flag, Value::Flag(v) => v;
 }
 
-impl Place for WireThickness {
+impl FieldValue for WireThickness {
     fn kind() -> Kind {
         Kind::NumberOr { word: "auto", min: 0.0, max: 100.0 }
     }
@@ -116,7 +116,7 @@ impl Place for WireThickness {
     }
 }
 
-impl Place for Samples {
+impl FieldValue for Samples {
     fn kind() -> Kind {
         Kind::OneOfOr { word: ADAPTIVE, values: Self::FIXED }
     }
@@ -130,7 +130,7 @@ impl Place for Samples {
     }
 }
 
-impl<W: Words> Place for W {
+impl<W: Words> FieldValue for W {
     fn kind() -> Kind {
         Kind::Words(words_of::<W>())
     }
@@ -140,7 +140,7 @@ impl<W: Words> Place for W {
     }
 }
 
-impl Place for Vec<NamedView> {
+impl FieldValue for Vec<NamedView> {
     fn kind() -> Kind {
         Kind::WordList { words: words_of::<NamedView>(), count_max: SHEET_VIEWS_MAX }
     }
@@ -151,7 +151,7 @@ impl Place for Vec<NamedView> {
     }
 }
 
-impl<T: Place> Place for Option<T> {
+impl<T: FieldValue> FieldValue for Option<T> {
     const NULLABLE: bool = true;
 
     fn kind() -> Kind {
@@ -163,7 +163,7 @@ impl<T: Place> Place for Option<T> {
     }
 }
 
-impl<T: Place> Place for Dependent<T> {
+impl<T: FieldValue> FieldValue for Dependent<T> {
     fn kind() -> Kind {
         T::kind()
     }
@@ -174,7 +174,7 @@ impl<T: Place> Place for Dependent<T> {
 }
 
 /// Writes a list of [`Field`]s. An entry is the key and the place in a draft that it sets; then, as
-/// needed, the allowed values (`in`) if they differ from [`Place::kind`], a short name and the
+/// needed, the allowed values (`in`) if they differ from [`FieldValue::kind`], a short name and the
 /// default; then the description.
 macro_rules! fields {
     ($(

@@ -1,4 +1,5 @@
-//! Stage visibility, per sample: keeps the nearest triangle.
+//! Stage visibility, per sample: keeps the triangle that is nearest to the viewer. Of equal depths
+//! the lower id is kept.
 
 use super::samples::SampleBand;
 use super::visibility::Target;

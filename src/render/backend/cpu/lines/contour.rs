@@ -5,7 +5,7 @@
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous};
 use crate::backend::cpu::geometry::visibility::area;
-use crate::plan::{Edge, LinePass, Side};
+use crate::plan::{Edge, FaceSide, LinePass};
 
 /// True if the pass draws the edge in this view: not on the far side of a closed surface, and for a
 /// contour only the silhouette.
@@ -36,7 +36,7 @@ impl RasterContext<'_> {
         if face == Edge::NO_FACE {
             return true;
         }
-        let is_inside_out = lines.unseen_side == Some(Side::Front);
+        let is_inside_out = lines.unseen_side == Some(FaceSide::Front);
         self.area_of(face).is_some_and(|area| area != 0 && (area < 0) == is_inside_out)
     }
 

@@ -8,7 +8,7 @@
 use super::farthest::Farthest;
 use super::holes::Holes;
 use super::segment::{PixelBox, SLACK_PX, Segment, rows};
-use super::stroke::{self, Direction, Mask, Pen, Place, Places};
+use super::stroke::{self, Direction, Mask, Pen, PixelDistances, Places};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::recip;
@@ -261,7 +261,7 @@ impl Piece {
 
     /// The depth in the point of the piece that is nearest to a pixel's centre.
     #[inline(always)]
-    pub(super) fn depth(&self, segment: &Segment, place: &Place) -> f32 {
+    pub(super) fn depth(&self, segment: &Segment, place: &PixelDistances) -> f32 {
         let t = self.range[0] + place.past_start() * segment.inverse_length;
         segment.depth(t.max(self.range[0]).min(self.range[1]))
     }

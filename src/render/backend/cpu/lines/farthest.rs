@@ -1,5 +1,6 @@
-//! Stage lines: the farthest depth, per pixel, that the triangles visible in it reach. An edge that
-//! is farther in all pixels along it is hidden, whatever those triangles are.
+//! Stage lines, per pixel: the farthest depth of all triangles that are visible in the pixel. An
+//! edge that is farther than this in every pixel along it is hidden, and no triangle has to be
+//! tested.
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};

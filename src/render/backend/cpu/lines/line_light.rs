@@ -11,7 +11,7 @@ use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::surface::barycentric::{Barycentrics, Corners};
 use crate::backend::cpu::surface::light::{Light, light as light_on};
 use crate::backend::cpu::surface::normal::normals;
-use crate::backend::cpu::surface::wire::Place;
+use crate::backend::cpu::surface::wire::ShadedPoints;
 use crate::plan::{SurfacePass, flags, sample_offsets};
 
 /// The light of every pixel of the band that has an owner, the face that lights its lines, plus 1.
@@ -59,7 +59,7 @@ fn point(context: &RasterContext<'_>, surface: &SurfacePass<'_>, id: u32, at: [f
     let (ids, at) = ([id], at.map(|v| [v]));
     let mut b = Barycentrics::new(&Corners::new(context, &ids, &at));
     b.value = inside(b.value.map(|[v]| v)).map(|v| [v]);
-    let normal = normals(surface, material, &Place { context, ids, at, b }).map(|[v]| v);
+    let normal = normals(surface, material, &ShadedPoints { context, ids, at, b }).map(|[v]| v);
     light_on(&surface.lights, &context.plan.projection, material.metallic, material.roughness, normal)
 }
 

@@ -1,5 +1,6 @@
-//! Lines without any shortcut, for tests that compare pictures: hidden-line removal examines every
-//! triangle that is visible along an edge, one by one, and strokes look at every pixel around them.
+//! Lines without any shortcut, for tests that compare pictures with those of the fast code.
+//! Hidden-line removal tests every triangle that is visible along an edge, one by one, and a stroke
+//! is drawn in every pixel around it.
 
 use super::edge::{LineDrawer, LineTarget, Piece, Window};
 use super::hidden_lines::{HiddenIntervals, hidden_by};

@@ -135,8 +135,8 @@ impl Direction {
     /// The place of a pixel beside a piece with this direction. The piece's ends are given from the
     /// pixel's centre.
     #[inline(always)]
-    pub fn place(&self, ends: [[f32; 2]; 2]) -> Place {
-        Place::new(self.along, ends)
+    pub fn place(&self, ends: [[f32; 2]; 2]) -> PixelDistances {
+        PixelDistances::new(self.along, ends)
     }
 }
 
@@ -221,19 +221,19 @@ impl Places {
 
     /// Pixel l's.
     #[inline(always)]
-    pub fn of(&self, l: usize) -> Place {
-        Place { across: self.across[l], past: [self.past[0][l], self.past[1][l]] }
+    pub fn of(&self, l: usize) -> PixelDistances {
+        PixelDistances { across: self.across[l], past: [self.past[0][l], self.past[1][l]] }
     }
 }
 
 /// Distances of a pixel's centre: from the line, past the piece's start and past its end.
 #[derive(Clone, Copy)]
-pub struct Place {
+pub struct PixelDistances {
     across: f32,
     past: [f32; 2],
 }
 
-impl Place {
+impl PixelDistances {
     /// The place of a pixel beside a piece of an edge that runs along a unit vector. The piece's ends
     /// are given from the pixel's centre.
     #[inline(always)]
@@ -267,7 +267,13 @@ impl Place {
 /// `ends` are the piece's, in pixels from the pixel's centre. `mask`, which is empty, gets the
 /// covered points.
 #[inline(always)]
-pub fn cover(pen: &Pen, direction: &Direction, ends: [[f32; 2]; 2], place: &Place, mask: &mut Mask) -> Option<Amount> {
+pub fn cover(
+    pen: &Pen,
+    direction: &Direction,
+    ends: [[f32; 2]; 2],
+    place: &PixelDistances,
+    mask: &mut Mask,
+) -> Option<Amount> {
     // Does the pixel reach past the start, and past the end?
     let reaches = [place.past[0] < direction.box_along, place.past[1] > -direction.box_along];
     if reaches == [false; 2] {

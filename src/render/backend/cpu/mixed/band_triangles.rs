@@ -1,4 +1,5 @@
-//! Stage mixed, per band: the triangles that its pixels are offered, in the order in which they are.
+//! Stage mixed, per band: the triangles of the band in the order in which pixels test them: clipped
+//! pieces, then triangles that face the viewer, then those that face away.
 
 use std::borrow::Cow;
 use std::ops::ControlFlow;

@@ -25,14 +25,14 @@ use crate::backend::cpu::surface::waiting::{Point, Waiting};
 
 /// The colours of some mixed pixels, and the points of those at the border of all faces.
 #[derive(Default)]
-pub struct Found {
+pub struct MixedColors {
     /// By pixel: premultiplied linear RGBA, nothing behind it.
     pub colors: Vec<[f32; 4]>,
     /// Under lines: the pixels, by number, of which some points see nothing, and the points that see something.
     pub borders: Vec<(u32, PointSet<ALL_WORDS>)>,
 }
 
-impl Found {
+impl MixedColors {
     /// Allocated memory, at most, bytes.
     pub const BYTES_MAX: usize = PIXELS_MAX * (size_of::<[f32; 4]>() + size_of::<(u32, PointSet<ALL_WORDS>)>());
 
@@ -50,7 +50,7 @@ dispatch! {
         triangles: (&BandTriangles<'_>, &PixelLists, &mut Recent),
         pixels: &MixedPixels,
         samples: &SampleBand,
-        found: &mut Found,
+        found: &mut MixedColors,
     ) = color_kernel
 }
 
@@ -60,7 +60,7 @@ fn color_kernel(
     (triangles, lists, recent): (&BandTriangles<'_>, &PixelLists, &mut Recent),
     pixels: &MixedPixels,
     samples: &SampleBand,
-    found: &mut Found,
+    found: &mut MixedColors,
 ) {
     let plan = context.plan;
     let surface =
@@ -69,7 +69,7 @@ fn color_kernel(
     let mut painter = Painter { context, shader: Shader::new(context), waiting };
     let mut few = Points::<1>::new();
     let mut all = Points::<ALL_WORDS>::new();
-    let Found { colors, borders } = found;
+    let MixedColors { colors, borders } = found;
     let has_lines = !plan.lines.is_empty();
     borders.clear();
     borders.reserve_exact(if has_lines { PIXELS_MAX } else { 0 });

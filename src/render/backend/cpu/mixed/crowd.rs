@@ -1,4 +1,5 @@
-//! Stage mixed, per pixel: the face that each point sees, one after the other. For pixels of many faces, and for tests.
+//! Stage mixed, per pixel: the nearest face at each point, with one depth and one id per point. For
+//! pixels with more faces than [`faces`](super::faces) has room for, and for tests.
 
 use super::points::{Lattice, PointSet};
 use super::shares::{Share, Shares};

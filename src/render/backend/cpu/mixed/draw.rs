@@ -4,7 +4,7 @@
 //! have are not enough there. So its colour is computed once more, from 64 or 256 points.
 
 use super::band_triangles::BandTriangles;
-use super::color::{Found, color};
+use super::color::{MixedColors, color};
 use super::find::{Finder, MixedPixels, find};
 use super::lists::{ListsEnd, PIXELS_MAX, PixelLists, fill};
 use super::recent::Recent;
@@ -24,7 +24,7 @@ pub struct MixedScratch {
     lists: PixelLists,
     recent: Recent,
     /// The colours of that batch.
-    found: Found,
+    found: MixedColors,
     /// The points that see something, for pixels in which others see nothing. Lines need them.
     pub border: BorderPoints,
 }
@@ -47,7 +47,7 @@ impl MixedScratch {
             + Finder::bytes_of(size)
             + PixelLists::BYTES_MAX
             + Recent::BYTES_MAX
-            + Found::BYTES_MAX
+            + MixedColors::BYTES_MAX
             + border
     }
 }

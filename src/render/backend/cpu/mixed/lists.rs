@@ -1,4 +1,5 @@
-//! Stage mixed, per band: the triangles that each of some mixed pixels may show.
+//! Stage mixed, per band: for each mixed pixel of a batch, the list of the triangles that may be
+//! visible in it.
 
 use std::ops::Range;
 

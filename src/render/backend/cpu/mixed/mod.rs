@@ -1,11 +1,14 @@
 //! Stage mixed, per pixel, of plans with adaptive samples: pixels near which faces meet that differ in
 //! colour are drawn again, from 64 or 256 coverage points each.
 //!
-//! [`find`] says which pixels are mixed, by what decides the colours of their faces ([`find::look`]). [`lists`] has the
-//! triangles that each may show, of those of the band ([`band_triangles`]). [`points`] has the points of a pixel,
-//! [`triangle`] says which of them a triangle covers, [`faces`] and [`crowd`] which face each sees, [`shares`] and
-//! [`color`] what colour that makes. [`thinness`] is the test for triangles that samples miss. [`draw`] runs all for a
-//! band.
+//! [`draw`] runs these steps for a band:
+//!
+//! 1. [`find`] finds the mixed pixels. It compares the looks of their faces ([`find::look`]), and adds pixels with
+//!    triangles so thin that samples miss them ([`thinness`]).
+//! 2. [`lists`] lists the triangles of the band ([`band_triangles`]) that may be visible in each of these pixels.
+//! 3. [`triangle`] finds the points of the pixel that a triangle covers. [`points`] defines the points.
+//! 4. [`faces`] finds the nearest face at each point. [`crowd`] does so for pixels with many faces.
+//! 5. [`color`] shades each of these faces, and sums their colours by their [`shares`] of the points.
 
 pub(crate) mod band_triangles;
 mod color;

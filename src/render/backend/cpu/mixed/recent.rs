@@ -1,4 +1,5 @@
-//! Stage mixed: the triangles that were offered last, set up. Neighbouring pixels are offered the same ones.
+//! Stage mixed: a cache of the triangles that were used last, with their edge functions set up.
+//! Neighbouring pixels mostly show the same triangles.
 
 use super::band_triangles::{BandTriangles, ScreenTriangle};
 use super::triangle::PointTriangle;
@@ -12,11 +13,13 @@ const NO_ITEM: u32 = u32::MAX;
 /// By the lowest bits of an item: a triangle.
 #[derive(Default)]
 pub struct Recent {
-    places: Vec<Place>,
+    places: Vec<RememberedTriangle>,
 }
 
+/// A slot of [`Recent`].
 #[derive(Clone)]
-struct Place {
+struct RememberedTriangle {
+    /// The item whose triangle it is, or [`NO_ITEM`].
     item: u32,
     /// None where it has no area.
     triangle: Option<PointTriangle>,
@@ -24,18 +27,18 @@ struct Place {
 
 impl Recent {
     /// Allocated memory, at most, bytes.
-    pub const BYTES_MAX: usize = COUNT * size_of::<Place>();
+    pub const BYTES_MAX: usize = COUNT * size_of::<RememberedTriangle>();
 
     /// Allocated memory, bytes.
     pub fn bytes(&self) -> usize {
-        self.places.capacity() * size_of::<Place>()
+        self.places.capacity() * size_of::<RememberedTriangle>()
     }
 
     /// Forgets all: another band has other items.
     pub fn clear(&mut self) {
         if self.places.is_empty() {
             self.places.reserve_exact(COUNT);
-            self.places.resize(COUNT, Place { item: NO_ITEM, triangle: None });
+            self.places.resize(COUNT, RememberedTriangle { item: NO_ITEM, triangle: None });
         }
         for place in &mut self.places {
             place.item = NO_ITEM;
@@ -48,7 +51,7 @@ impl Recent {
         let place = self.places.get_mut(item as usize % COUNT)?;
         if place.item != item {
             let ScreenTriangle { id, corners } = triangles.get(item);
-            *place = Place { item, triangle: PointTriangle::new(id, &corners) };
+            *place = RememberedTriangle { item, triangle: PointTriangle::new(id, &corners) };
         }
         place.triangle.as_mut()
     }

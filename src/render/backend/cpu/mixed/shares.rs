@@ -1,4 +1,5 @@
-//! Stage mixed, per pixel: the shares of its triangles.
+//! Stage mixed, per pixel: the visible triangles of the pixel, each with its share of the pixel's
+//! points.
 
 use super::points::PointSet;
 use crate::backend::sample_partition::POINTS;

@@ -1,5 +1,5 @@
-//! Stage mixed, per triangle and row: the columns of pixels that a triangle may touch. The box of a triangle that is
-//! not along the axes has twice as many pixels, and more.
+//! Stage mixed, per triangle and row: the columns of pixels that the triangle may touch. For a
+//! slanted triangle these are at most half of the pixels of its bounding box.
 
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 

@@ -1,4 +1,5 @@
-//! Stage mixed, per triangle: the test for triangles so thin that samples miss them.
+//! Stage mixed, per triangle: tests whether the triangle is so thin that it may lie between
+//! samples.
 
 /// A thin triangle is this many times as long as it is high, or more.
 pub const ASPECT: i32 = 4;

@@ -5,7 +5,7 @@ use super::barycentric::{Corners, edge_distances_px};
 use super::light::{light, lit};
 use super::normal::normals;
 use super::texture::{Uv, blend, floor, of_corners};
-use super::wire::{Place, edge_mask, is_drawn};
+use super::wire::{ShadedPoints, edge_mask, is_drawn};
 use crate::backend::cpu::vector::dot;
 use crate::plan::{ShadedMaterial, SurfacePass, debug_views, flags};
 
@@ -13,7 +13,7 @@ use crate::plan::{ShadedMaterial, SurfacePass, debug_views, flags};
 pub fn color(
     surface: &SurfacePass<'_>,
     material: &ShadedMaterial,
-    place: &Place<'_, 1>,
+    place: &ShadedPoints<'_, 1>,
     corners: &Corners<1>,
 ) -> [f32; 4] {
     let [b0, b1, b2] = place.b.value.map(|[v]| v);

@@ -3,7 +3,7 @@
 
 use super::barycentric::Quad;
 use super::texture::{blend, of_corners, uv_corners};
-use super::wire::Place;
+use super::wire::ShadedPoints;
 use crate::backend::cpu::vector::{across, cross, dot, facing, turned_to_viewer, unit_or, zip};
 use crate::plan::{CornerValues, Projection, ShadedMaterial, SurfacePass, flags, slots};
 
@@ -12,7 +12,7 @@ use crate::plan::{CornerValues, Projection, ShadedMaterial, SurfacePass, flags, 
 pub fn normals<const N: usize>(
     surface: &SurfacePass<'_>,
     material: &ShadedMaterial,
-    place: &Place<'_, N>,
+    place: &ShadedPoints<'_, N>,
 ) -> [[f32; N]; 3] {
     if material.flags & flags::DERIVATIVE_NORMALS != 0 {
         return derivative_normals(place);
@@ -42,7 +42,11 @@ pub fn face_normals<const N: usize>(surface: &SurfacePass<'_>, ids: &[u32; N], f
 /// Shares of alpha that a material of [`flags::BY_ANGLE`] keeps where its unit normals are these: all at
 /// grazing angles.
 #[inline(always)]
-pub fn angle_shares<const N: usize>(material: &ShadedMaterial, place: &Place<'_, N>, n: &[[f32; N]; 3]) -> [f32; N] {
+pub fn angle_shares<const N: usize>(
+    material: &ShadedMaterial,
+    place: &ShadedPoints<'_, N>,
+    n: &[[f32; N]; 3],
+) -> [f32; N] {
     let projection = &place.context.plan.projection;
     let slope = projection.ray_slope();
     let least = material.facing_opacity;
@@ -69,8 +73,8 @@ pub fn to_viewer<const N: usize>(projection: &Projection) -> [[f32; N]; 3] {
 /// The cross products of the position's fine derivatives in blocks of 2 x 2 pixels, as a GPU's
 /// rasterizer has them: in f32, with the same rounding errors on both back-ends.
 #[inline(always)]
-fn derivative_normals<const N: usize>(place: &Place<'_, N>) -> [[f32; N]; 3] {
-    let Place { context, ids, at, .. } = place;
+fn derivative_normals<const N: usize>(place: &ShadedPoints<'_, N>) -> [[f32; N]; 3] {
+    let ShadedPoints { context, ids, at, .. } = place;
     let quad = Quad::around(context.plan, at);
     let corners = corner_positions(place);
     // Bounds a neighbour beyond the horizon of the triangle's plane.
@@ -92,7 +96,7 @@ fn derivative_normals<const N: usize>(place: &Place<'_, N>) -> [[f32; N]; 3] {
 
 /// The triangles' corners in the unit box: `[corner][component][lane]`.
 #[inline(always)]
-fn corner_positions<const N: usize>(place: &Place<'_, N>) -> [[[f32; N]; 3]; 3] {
+fn corner_positions<const N: usize>(place: &ShadedPoints<'_, N>) -> [[[f32; N]; 3]; 3] {
     let mut corners = [[[0.0; N]; 3]; 3];
     for l in 0..N {
         for (corner, (position, _)) in corners.iter_mut().zip(place.context.positions_of(place.ids[l])) {
@@ -110,7 +114,7 @@ fn corner_positions<const N: usize>(place: &Place<'_, N>) -> [[[f32; N]; 3]; 3] 
 pub fn normal_mapped<const N: usize>(
     (surface, uvs): (&SurfacePass<'_>, &CornerValues<'_, [f32; 2]>),
     material: &ShadedMaterial,
-    place: &Place<'_, N>,
+    place: &ShadedPoints<'_, N>,
     texels: &[[f32; N]; 4],
     n: &[[f32; N]; 3],
 ) -> [[f32; N]; 3] {

@@ -7,7 +7,7 @@ use super::light::{Light, LightLanes, light_lanes, lit_lanes, unlit_lanes};
 use super::normal::{angle_shares, face_normals, normal_mapped, normals, to_viewer};
 use super::occlusion_texture::apply_occlusion_texture;
 use super::texture::{Uv, blend, of_corners, sample, uv_corners};
-use super::wire::{Place, edge_mask, fwidth_covers, wire_covers};
+use super::wire::{ShadedPoints, edge_mask, fwidth_covers, wire_covers};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, quick_recip};
 use crate::backend::cpu::geometry::visibility::area;
@@ -259,15 +259,15 @@ impl Points<'_> {
         at: &[[f32; N]; 2],
         corners: &Corners<N>,
         is_textured: bool,
-    ) -> Place<'_, N> {
+    ) -> ShadedPoints<'_, N> {
         let is_deciding = is_textured || self.material.flags & DECIDING != 0;
         let b = if is_deciding { Barycentrics::exact(corners) } else { Barycentrics::new(corners) };
-        Place { context: self.context, ids: *ids, at: *at, b }
+        ShadedPoints { context: self.context, ids: *ids, at: *at, b }
     }
 
     /// Coverage of the wires times their shown opacity.
     #[inline(always)]
-    fn wire_covers<const N: usize>(&self, place: &Place<'_, N>) -> [f32; N] {
+    fn wire_covers<const N: usize>(&self, place: &ShadedPoints<'_, N>) -> [f32; N] {
         if self.material.flags & flags::WIRES == 0 || self.show.wires <= 0.0 {
             return [0.0; N];
         }
@@ -287,7 +287,7 @@ impl Points<'_> {
 
     /// Texels by slot; white where there is no texture.
     #[inline(always)]
-    fn texels<const N: usize>(&self, place: &Place<'_, N>, is_textured: bool) -> [[[f32; N]; 4]; slots::COUNT] {
+    fn texels<const N: usize>(&self, place: &ShadedPoints<'_, N>, is_textured: bool) -> [[[f32; N]; 4]; slots::COUNT] {
         let mut texels = [[[1.0; N]; 4]; slots::COUNT];
         let Some(uvs) = self.surface.uvs.as_ref().filter(|_| is_textured) else { return texels };
         let share = self.footprint();
@@ -309,7 +309,7 @@ impl Points<'_> {
 
     /// Base colours with straight alpha, as [`with_alpha`] leaves it.
     #[inline(always)]
-    fn base_colors<const N: usize>(&self, place: &Place<'_, N>, texels: &[[f32; N]; 4]) -> [[f32; N]; 4] {
+    fn base_colors<const N: usize>(&self, place: &ShadedPoints<'_, N>, texels: &[[f32; N]; 4]) -> [[f32; N]; 4] {
         let tint = match &self.surface.colors {
             Some(colors) if self.material.flags & flags::VERTEX_COLORS != 0 => {
                 blend(&of_corners(colors, &place.ids), &place.b.value)

@@ -5,7 +5,7 @@ use crate::backend::cpu::RasterContext;
 use crate::plan::{ShadedMaterial, SurfacePass, flags};
 
 /// `N` shaded points: their triangles and their positions.
-pub struct Place<'a, const N: usize> {
+pub struct ShadedPoints<'a, const N: usize> {
     /// Everything that is drawn.
     pub context: &'a RasterContext<'a>,
     /// The triangles.
@@ -21,7 +21,7 @@ pub struct Place<'a, const N: usize> {
 pub fn wire_covers<const N: usize>(
     surface: &SurfacePass<'_>,
     material: &ShadedMaterial,
-    place: &Place<'_, N>,
+    place: &ShadedPoints<'_, N>,
 ) -> [f32; N] {
     let masks = place.ids.map(|id| edge_mask(surface, id));
     let b = &place.b;

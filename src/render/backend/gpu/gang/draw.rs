@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::seat::Share;
+use super::seat::GangShare;
 use crate::backend::DrawError;
 use crate::backend::gpu::buffers::Buffers;
 use crate::backend::gpu::device::Gpu;
@@ -40,7 +40,12 @@ impl Pictures {
 }
 
 /// Draws the pictures of all shares, the first of which is the plan's own.
-pub fn draw(gpu: &Arc<Gpu>, plan: &DrawPlan<'_>, schedule: &Schedule, shares: &[Share]) -> Result<Pictures, DrawError> {
+pub fn draw(
+    gpu: &Arc<Gpu>,
+    plan: &DrawPlan<'_>,
+    schedule: &Schedule,
+    shares: &[GangShare],
+) -> Result<Pictures, DrawError> {
     gpu.check()?;
     let mut buffers = gpu.spare_buffers.take();
     let drawn = gpu.scoped(|| submit(gpu, &mut buffers, plan, schedule, shares));
@@ -67,9 +72,9 @@ fn submit(
     buffers: &mut Buffers,
     plan: &DrawPlan<'_>,
     schedule: &Schedule,
-    shares: &[Share],
+    shares: &[GangShare],
 ) -> Result<Pictures, DrawError> {
-    let key = shares.first().map_or(0, Share::key);
+    let key = shares.first().map_or(0, GangShare::key);
     let kernels = schedule.kernels();
     gpu.make_pipelines(&kernels, key)?;
     upload_geometry(gpu, buffers, plan, schedule)?;
@@ -88,14 +93,14 @@ fn submit(
     }
     let mut encoder = gpu.handles.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None });
     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes: None });
-    let own = shares.first().map_or(&[][..], Share::dispatches);
+    let own = shares.first().map_or(&[][..], GangShare::dispatches);
     for (number, dispatch) in own.iter().enumerate() {
         let Some((pipeline, buffers)) = kernels.iter().position(|k| *k == dispatch.kernel).and_then(|at| bound.get(at))
         else {
             continue;
         };
         let most = |axis: usize| {
-            let of = |share: &Share| share.dispatches().get(number).map_or(1, |dispatch| dispatch.workgroups[axis]);
+            let of = |share: &GangShare| share.dispatches().get(number).map_or(1, |dispatch| dispatch.workgroups[axis]);
             shares.iter().map(of).max().unwrap_or(1)
         };
         pass.set_pipeline(&pipeline.pipeline);
@@ -131,7 +136,7 @@ fn reserve(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, all: &Starts) 
 }
 
 /// The uniforms of all jobs, and of all jobs for each dispatch; the end of each picture, bytes; and the sizes of all.
-fn uniforms(shares: &[Share]) -> (Vec<Frame>, Vec<Batch>, Vec<usize>, Starts) {
+fn uniforms(shares: &[GangShare]) -> (Vec<Frame>, Vec<Batch>, Vec<usize>, Starts) {
     let dispatches = shares.first().map_or(0, |share| share.dispatches().len());
     let mut frames = vec![Frame::default(); JOBS_MAX];
     let mut batches = vec![Batch::default(); JOBS_MAX * dispatches];

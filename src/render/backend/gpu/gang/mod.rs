@@ -13,9 +13,9 @@ mod seat;
 mod turns;
 
 pub use self::draw::{Pictures, draw};
-pub use self::seat::{Share, may_share};
+pub use self::seat::{GangShare, may_share};
 use self::turns::Turns;
 pub use self::turns::{Leading, Seat, Turn};
 
 /// The gangs of a device.
-pub type Gangs = Turns<Share, Pictures>;
+pub type Gangs = Turns<GangShare, Pictures>;

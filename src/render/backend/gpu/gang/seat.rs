@@ -21,7 +21,7 @@ const MATERIALS_MAX: usize = 64;
 
 /// A job's share in a gang.
 #[derive(Clone)]
-pub struct Share(Arc<Own>);
+pub struct GangShare(Arc<Own>);
 
 struct Own {
     kind: Kind,
@@ -63,7 +63,7 @@ pub fn may_share(plan: &DrawPlan<'_>) -> bool {
     plan.is_shaded() && !has_more && !plan.is_adaptive && plan.pass_masks.is_empty()
 }
 
-impl Share {
+impl GangShare {
     /// The share of a job; None if the job is drawn alone.
     pub fn of(plan: &DrawPlan<'_>, schedule: &Schedule) -> Option<Self> {
         let is_one_band = schedule.banding.rows >= plan.height_px && schedule.banding.beyond == 0;
@@ -110,7 +110,7 @@ impl Share {
     }
 }
 
-impl Seat for Share {
+impl Seat for GangShare {
     fn is_alike(&self, other: &Self) -> bool {
         // Of equal size, so that a gang of the largest number of jobs has room.
         Arc::ptr_eq(&self.0, &other.0) || (self.0.amounts == other.0.amounts && self.0.kind == other.0.kind)

@@ -9,7 +9,7 @@ use crate::plan::{DrawPlan, SurfacePass, flags, slots};
 pub const SURFACE: u32 = 1;
 /// An outline mesh.
 pub const HULL: u32 = 2;
-/// The jobs of a gang share the kernel. No feature of a plan: whoever draws a gang adds it.
+/// The jobs of a gang share the kernel. No feature of a plan: the code that draws a gang sets it.
 pub const GANG: u32 = 4;
 /// A material lit by face normals.
 pub const FACE_NORMALS: u32 = 8;

@@ -2,7 +2,7 @@
 //! sizes agree. Data is checked where it is read, and materials where they are used.
 
 use super::lists::{Index, Lists};
-use super::schema::{Attributes, Document, Mesh, Node, mode};
+use super::schema::{Attributes, Document, MeshJson, Node, mode};
 use crate::import::MeshError;
 
 /// Fails where a picture of the file would be a guess.
@@ -68,7 +68,7 @@ fn check_stride(doc: &Document, index: usize) -> Result<(), MeshError> {
     }
 }
 
-fn check_mesh(doc: &Document, lists: &Lists<'_>, index: usize, mesh: &Mesh) -> Result<(), MeshError> {
+fn check_mesh(doc: &Document, lists: &Lists<'_>, index: usize, mesh: &MeshJson) -> Result<(), MeshError> {
     for (i, primitive) in mesh.primitives.iter().enumerate() {
         let what = || format!("primitive {i} of mesh {index}");
         let accessor = |accessor: &Index| refer("accessor", *accessor, doc.accessors.len(), what);
@@ -115,7 +115,7 @@ fn check_influences(attributes: &Attributes, what: impl Fn() -> String) -> Resul
     Err(broken(&what(), "has JOINTS_n and WEIGHTS_n that do not come in pairs from 0 up"))
 }
 
-fn check_weights(what: &str, weights: Option<&[f64]>, mesh: &Mesh) -> Result<(), MeshError> {
+fn check_weights(what: &str, weights: Option<&[f64]>, mesh: &MeshJson) -> Result<(), MeshError> {
     let targets = mesh.primitives.first().map_or(0, |primitive| primitive.targets.len());
     match weights {
         Some(weights) if weights.len() != targets && !(weights.is_empty() || mesh.primitives.is_empty()) => {

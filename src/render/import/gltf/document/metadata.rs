@@ -16,7 +16,7 @@ struct Document {
     asset: Asset,
     scenes: Vec<IgnoredAny>,
     nodes: Vec<IgnoredAny>,
-    meshes: Vec<Mesh>,
+    meshes: Vec<CountedMesh>,
     animations: Vec<IgnoredAny>,
     skins: Vec<IgnoredAny>,
     cameras: Vec<IgnoredAny>,
@@ -32,7 +32,7 @@ struct Asset {
 
 #[derive(Default, Deserialize)]
 #[serde(default)]
-struct Mesh {
+struct CountedMesh {
     primitives: Vec<IgnoredAny>,
 }
 

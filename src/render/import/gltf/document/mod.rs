@@ -167,7 +167,7 @@ mod tests {
             size_of::<schema::Node>(),
             size_of::<schema::Accessor>(),
             size_of::<schema::Primitive>(),
-            size_of::<schema::Mesh>(),
+            size_of::<schema::MeshJson>(),
             size_of::<schema::BufferView>(),
             size_of::<schema::Skin>(),
         ];

@@ -22,7 +22,7 @@ pub struct Document {
     #[serde(default)]
     pub nodes: Vec<Node>,
     #[serde(default)]
-    pub meshes: Vec<Mesh>,
+    pub meshes: Vec<MeshJson>,
     #[serde(default)]
     pub skins: Vec<Skin>,
     #[serde(default)]
@@ -97,8 +97,11 @@ pub struct Visibility {
 }
 
 /// `mesh`
+///
+/// `rename` and `expecting`: error messages that clients see say "Mesh".
 #[derive(Debug, Deserialize)]
-pub struct Mesh {
+#[serde(rename = "Mesh", expecting = "struct Mesh")]
+pub struct MeshJson {
     pub primitives: Vec<Primitive>,
     pub weights: Option<Vec<f64>>,
 }

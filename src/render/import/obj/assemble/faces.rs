@@ -66,8 +66,7 @@ fn fill_triangles(
     };
     let count = raw.triangles.len();
     raw.edge_masks = vec![ALL_EDGES; count];
-    // Most files have one material, or none. Zeros come from the system, and nobody has to write
-    // them.
+    // Most files have one material, or none. Memory from the system is zero, so nothing has to be written.
     raw.triangle_materials = vec![0; count];
     let mut at = 0;
     for (number, part) in parts.iter().enumerate() {

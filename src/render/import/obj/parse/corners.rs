@@ -1,7 +1,7 @@
 //! Faces in their plainest form: all corners alike, short indices without a sign, or relative ones.
 
 use super::decimal::whole;
-use super::{CORNERS_PER_POLL, Fault, Parser};
+use super::{CORNERS_PER_POLL, Parser, PartError};
 use crate::import::obj::face::MISSING;
 
 /// Digits of an index that cannot overflow.
@@ -14,7 +14,7 @@ type FaceEnd = (usize, (bool, bool));
 impl Parser<'_, '_, '_> {
     /// A face of three or more corners, all `v`, `v/vt`, `v//vn` or `v/vt/vn`.
     #[inline]
-    pub(super) fn plain_face(&mut self, at: usize) -> Result<Option<usize>, Fault> {
+    pub(super) fn plain_face(&mut self, at: usize) -> Result<Option<usize>, PartError> {
         if let Some(end) = self.plain_triangle_or_quad(at) {
             return Ok(Some(end));
         }
@@ -77,7 +77,7 @@ impl Parser<'_, '_, '_> {
 
     /// The corners of the face at `at`, in `self.line`.
     #[inline]
-    fn plain_corners(&mut self, mut at: usize) -> Result<Option<FaceEnd>, Fault> {
+    fn plain_corners(&mut self, mut at: usize) -> Result<Option<FaceEnd>, PartError> {
         self.line.clear();
         let mut form = None;
         loop {

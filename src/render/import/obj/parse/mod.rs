@@ -107,7 +107,7 @@ pub struct Group {
 
 /// The end of a part that cannot be parsed.
 #[derive(Debug)]
-pub enum Fault {
+pub enum PartError {
     /// A relative index, and the counts before the part are not known.
     NeedsCounts,
     /// Broken content: the line in the part, and what is wrong.
@@ -124,13 +124,13 @@ impl Part<'_> {
     }
 }
 
-impl From<Stopped> for Fault {
+impl From<Stopped> for PartError {
     fn from(_: Stopped) -> Self {
         Self::Stopped
     }
 }
 
-impl Fault {
+impl PartError {
     /// The error, if `lines` come before the part.
     pub fn error(self, lines: u64) -> MeshError {
         match self {
@@ -142,7 +142,7 @@ impl Fault {
 }
 
 /// Parses one part.
-pub fn parse<'t>(bytes: &'t [u8], places: Places<'_>, rules: Rules<'_>) -> Result<Part<'t>, Fault> {
+pub fn parse<'t>(bytes: &'t [u8], places: Places<'_>, rules: Rules<'_>) -> Result<Part<'t>, PartError> {
     rules.deadline.check()?;
     let lists = Lists {
         positions: List::new(places.positions),
@@ -186,7 +186,7 @@ struct Parser<'t, 'a, 'r> {
 impl Parser<'_, '_, '_> {
     /// Parses the line at `at` if it is in the plainest form, and gives the begin of the next.
     #[inline]
-    fn plain_line(&mut self, at: usize) -> Result<Option<usize>, Fault> {
+    fn plain_line(&mut self, at: usize) -> Result<Option<usize>, PartError> {
         let (first, second) = (self.bytes[at], self.bytes.get(at + 1).copied().unwrap_or(self.rules.newline));
         Ok(match (first, second) {
             (b'v', b' ') => self.plain_vertex(at + 2),

@@ -3,7 +3,7 @@
 
 use super::decimal;
 use super::numbers::{opaque, upright};
-use super::{CORNERS_PER_POLL, Fault, Parser};
+use super::{CORNERS_PER_POLL, Parser, PartError};
 use crate::import::obj::face::{Counts, MISSING, parse_corner, show};
 use crate::import::obj::lines::{Lines, uncommented};
 use crate::import::text::{before_comment, is_c_nan};
@@ -13,7 +13,7 @@ use std::borrow::Cow;
 impl<'t> Parser<'t, '_, '_> {
     /// Parses the line at `at`, and gives the begin of the next.
     #[cold]
-    pub(super) fn any_line(&mut self, at: usize) -> Result<usize, Fault> {
+    pub(super) fn any_line(&mut self, at: usize) -> Result<usize, PartError> {
         let mut lines = Lines::of_part(&self.bytes[at..], self.rules.newline);
         let Some(line) = lines.next() else { return Ok(self.bytes.len()) };
         // A continued line has the number of its end.
@@ -31,7 +31,7 @@ impl<'t> Parser<'t, '_, '_> {
         Ok(self.bytes.len() - lines.rest_bytes())
     }
 
-    fn statement(&mut self, line: &[u8]) -> Result<(), Fault> {
+    fn statement(&mut self, line: &[u8]) -> Result<(), PartError> {
         let mut words = words(line);
         let Some(keyword) = words.next() else { return Ok(()) };
         match keyword {
@@ -58,7 +58,7 @@ impl<'t> Parser<'t, '_, '_> {
     }
 
     /// A position, with its colour or its weight.
-    fn vertex<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) -> Result<(), Fault> {
+    fn vertex<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) -> Result<(), PartError> {
         let (all, count) = first_seven(words);
         let given = all[..count].iter().copied();
         let mut position: [f64; 3] = self.numbers(b"v", "a vertex needs three numbers", given)?;
@@ -82,7 +82,7 @@ impl<'t> Parser<'t, '_, '_> {
         keyword: &[u8],
         needed: &str,
         mut words: impl Iterator<Item = &'w [u8]>,
-    ) -> Result<[f64; N], Fault> {
+    ) -> Result<[f64; N], PartError> {
         let mut values = [0.0; N];
         let mut is_number = true;
         for (i, value) in values.iter_mut().enumerate() {
@@ -103,7 +103,7 @@ impl<'t> Parser<'t, '_, '_> {
         if is_number { Ok(values) } else { Err(self.broken(needed.to_owned())) }
     }
 
-    fn face<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) -> Result<(), Fault> {
+    fn face<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) -> Result<(), PartError> {
         self.line.clear();
         for word in words {
             let corner = self.corner(word)?;
@@ -132,7 +132,11 @@ impl<'t> Parser<'t, '_, '_> {
     }
 
     /// The segments of a polyline, or points.
-    fn lines_and_points<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>, are_joined: bool) -> Result<(), Fault> {
+    fn lines_and_points<'w>(
+        &mut self,
+        words: impl Iterator<Item = &'w [u8]>,
+        are_joined: bool,
+    ) -> Result<(), PartError> {
         let mut before: Option<u32> = None;
         for (number, word) in (1_usize..).zip(words) {
             let v = self.corner(word)?[0];
@@ -154,17 +158,17 @@ impl<'t> Parser<'t, '_, '_> {
         Ok(())
     }
 
-    fn corner(&self, word: &[u8]) -> Result<[u32; 3], Fault> {
+    fn corner(&self, word: &[u8]) -> Result<[u32; 3], PartError> {
         let counts = self.rules.before.unwrap_or_default() + self.counts();
         match parse_corner(word, counts) {
-            _ if self.rules.before.is_none() && word.contains(&b'-') => Err(Fault::NeedsCounts),
+            _ if self.rules.before.is_none() && word.contains(&b'-') => Err(PartError::NeedsCounts),
             Ok(corner) => Ok(corner),
             Err(why) => Err(self.broken(why)),
         }
     }
 
-    fn broken(&self, what: String) -> Fault {
-        Fault::Line(self.part.lines, what)
+    fn broken(&self, what: String) -> PartError {
+        PartError::Line(self.part.lines, what)
     }
 }
 

@@ -64,7 +64,7 @@ pub struct Holes {
     width_px: usize,
     /// First and last row, the last excluded.
     rows: [i32; 2],
-    /// A bit per pixel that gets strokes, `row_words` words a row.
+    /// A bit per pixel that gets strokes, `row_words` words per row.
     stroked: Vec<u64>,
     /// The bits of [`COARSE_ROWS`] rows together.
     stroked_coarse: Vec<u64>,

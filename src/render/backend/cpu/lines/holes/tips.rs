@@ -1,8 +1,10 @@
-//! Stage lines, per face: its tips, which are corners in front of all that their pixel shows, of which no
-//! sample of the pixel shows the face. Twin of `shaders/lines/holes/tips.wgsl`.
+//! Stage lines, per face: finds tips, corners that are visible though no sample shows their face.
+//! Twin of `shaders/lines/holes/tips.wgsl`.
 //!
-//! A face without a sample nearby does not count in holes, though its lines may show: a spike that comes
-//! half a pixel out of a wall. The pixels around a tip get the strokes of all edges.
+//! A tip is a corner in front of everything that its pixel shows, of a face that no sample of the
+//! pixel shows. An example is a spike that stands half a pixel out of a wall. Its lines are
+//! visible, but it does not count in [`holes`](super), because that goes by samples. So the pixels
+//! around a tip get the strokes of all edges.
 
 use super::{Holes, MARKED, STROKED, looked_at};
 use crate::backend::cpu::RasterContext;

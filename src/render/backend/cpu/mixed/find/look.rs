@@ -1,7 +1,8 @@
-//! Stage mixed, per face: what decides its colour, as far as that is known without shading it.
+//! Stage mixed, per face: the look of a face, which is what decides its colour as far as that is
+//! known without shading it.
 //!
-//! Looks are compared, not shown. They are made of numbers that both back-ends have to the bit: colours
-//! that are shaded may differ in their last place.
+//! Looks are only compared with each other. They consist of numbers that are equal on both
+//! back-ends to the bit. Shaded colours would not do, because their last bits may differ.
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::NOTHING;

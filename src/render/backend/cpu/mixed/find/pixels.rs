@@ -1,5 +1,5 @@
-//! Stage mixed, per band: the list of the mixed pixels, row by row. A bit mask of the same pixels
-//! answers which numbers the pixels of a range of columns have.
+//! Stage mixed, per band: the list of the mixed pixels, row by row, and a bit mask of the same
+//! pixels. The mask gives the list's indices of the pixels in a range of columns.
 
 use std::ops::Range;
 

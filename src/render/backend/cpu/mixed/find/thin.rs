@@ -1,7 +1,9 @@
-//! Stage mixed, per triangle: those that are so thin that samples miss them, as hairs and slivers.
+//! Stage mixed, per triangle: finds triangles so thin that samples miss them, such as hairs and
+//! slivers, and marks the pixels that they touch.
 //!
-//! Each is followed along its longer side, and every pixel that it touches is marked where some sample sees what lies
-//! behind it, and colours break off from there to it. That pixel alone is mixed then, and not its neighbours.
+//! A thin triangle is followed along its longer side. A pixel that it touches is marked if a sample
+//! shows something behind the triangle whose colour differs from the triangle's. Only marked pixels
+//! are mixed, not their neighbours.
 
 use super::breaks;
 use super::pairs::Pairs;

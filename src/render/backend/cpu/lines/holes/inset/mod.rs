@@ -54,7 +54,7 @@ pub struct Insets {
 pub struct Inset {
     /// Pixel of the first corner.
     base: [i32; 2],
-    sides: [Side; 3],
+    sides: [InsetSide; 3],
     /// 1 or -1: the hand of the face.
     turn: f32,
     /// Least and greatest coordinates of the face, 1/256 px from the picture's corner.
@@ -63,7 +63,7 @@ pub struct Inset {
 
 /// A side of a face and of its inset.
 #[derive(Clone, Copy, Default)]
-struct Side {
+struct InsetSide {
     /// The face's corner at its start, 1/256 px from the picture's centre.
     corner: [f32; 2],
     unit: [f32; 2],
@@ -155,7 +155,7 @@ impl Insets {
         let corner = |k: usize| [self.corners[k][0][l], self.corners[k][1][l]];
         let [a, b, c] = [corner(0), corner(1), corner(2)];
         let end = |k: usize| [self.insets[k][0][l], self.insets[k][1][l]];
-        let side = |k: usize| Side {
+        let side = |k: usize| InsetSide {
             corner: corner(k).map(|v| v as f32),
             unit: [self.units[k][0][l], self.units[k][1][l]],
             ends: [end(k), end((k + 1) % 3)],
