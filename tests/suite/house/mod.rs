@@ -2,5 +2,6 @@
 
 mod deploy;
 mod documents;
+mod library;
 pub mod structure;
 mod systems;
