@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         flag.stop();
     });
 
-    match draw(input, &limits, &deadline) {
+    match draw(std::fs::read(input)?, &limits, &deadline) {
         Ok(png) => Ok(std::fs::write(output, png)?),
         Err(error) => match error.fault() {
             Fault::Mesh => Err(format!("{input} is refused: {error}").into()),
@@ -35,9 +35,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-fn draw(input: &str, limits: &Limits, deadline: &Deadline) -> Result<Vec<u8>, meshsnap::Error> {
-    let bytes = std::fs::read(input).unwrap_or_default();
-    let mesh = Mesh::reader().file("", bytes).limits(limits.clone()).deadline(deadline.clone()).read()?;
+fn draw(bytes: Vec<u8>, limits: &Limits, deadline: &Deadline) -> Result<Vec<u8>, meshsnap::Error> {
+    let mesh = Mesh::reader().file("", bytes).limits(limits.clone()).deadline(deadline).read()?;
     let mut renderer = Renderer::cpu().limits(limits.clone());
     let mut heard = |stage| eprintln!("{stage:?} has ended");
     let watch = Watch::default().deadline(deadline).progress(&mut heard);

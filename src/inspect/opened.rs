@@ -15,7 +15,7 @@ use meshsnap_render::pipeline::{
 use meshsnap_render::plan::{self, Prepared};
 use meshsnap_render::scene::Scene;
 use meshsnap_render::sheet::{self, Cell, Layout};
-use meshsnap_render::spec::{CameraSpec, Sheet, SheetViews, Spec};
+use meshsnap_render::spec::{CameraSpec, DebugView, Sheet, SheetViews, Spec};
 
 /// A file that was read, to be judged or compared.
 pub struct Opened {
@@ -131,11 +131,12 @@ fn mark_in(
     budget: &mut Budget,
     deadline: &Deadline,
 ) -> Result<(), RenderError> {
-    with_scene(view, spec, false, budget, deadline, |Staged { scene, is_uv_layout, .. }, _| {
-        // Places in space are nowhere in a layout of the texture.
-        if !is_uv_layout {
-            mark_places(image, &scene, places);
-        }
+    // Places in space are nowhere in a layout of the texture.
+    if spec.layers.surface.is_some_and(|surface| surface.debug == DebugView::UvLayout) {
+        return Ok(());
+    }
+    with_scene(view, spec, false, budget, deadline, |Staged { scene, .. }, _| {
+        mark_places(image, &scene, places);
         Ok(())
     })
 }

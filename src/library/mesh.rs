@@ -123,8 +123,8 @@ impl MeshReader {
 
     /// Sets a flag that stops the reading from another thread.
     #[must_use]
-    pub fn deadline(mut self, deadline: Deadline) -> Self {
-        self.deadline = deadline;
+    pub fn deadline(mut self, deadline: &Deadline) -> Self {
+        self.deadline = deadline.clone();
         self
     }
 

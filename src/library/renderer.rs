@@ -128,10 +128,11 @@ impl Renderer {
 
     /// Finds the triangle that each pixel of the same picture shows at its centre, and its distance. Always on the CPU.
     pub fn faces(&mut self, mesh: &Mesh, spec: &Spec, watch: Watch<'_>) -> Result<FaceBuffer, Error> {
-        let spec = self.understood(spec)?;
+        let (spec, mut nothing) = (self.understood(spec)?, |_| {});
+        let Watch { deadline, progress } = watch;
+        let ended = progress.unwrap_or(&mut nothing);
         let budget = Budget::new(&self.limits);
-        let deadline = &watch.deadline;
-        let mut context = Context { backends: &mut self.backends, budget, deadline, ended: &mut |_| {} };
+        let mut context = Context { backends: &mut self.backends, budget, deadline: &deadline, ended };
         Ok(pipeline::find_faces(mesh.model.view(), &spec, &mut context)?)
     }
 
@@ -195,6 +196,9 @@ mod tests {
         let mut hear = |stage| stages.push(stage);
         renderer.picture(&mesh, &spec, Watch::default().progress(&mut hear)).unwrap();
         assert_eq!(stages, [Stage::Plan, Stage::Render]);
+        let mut heard = 0;
+        renderer.faces(&mesh, &spec, Watch::default().progress(&mut |_| heard += 1)).unwrap();
+        assert_eq!(heard, 2);
         let deadline = Deadline::default();
         deadline.stop();
         let error = renderer.picture(&mesh, &spec, Watch::default().deadline(&deadline)).unwrap_err();
@@ -218,11 +222,19 @@ mod tests {
         let depths: Vec<f32> = faces.depths.iter().copied().filter(|depth| depth.is_finite()).collect();
         assert!(depths.iter().all(|depth| (depth - depths[0]).abs() < 1e-5), "a wall that faces the viewer");
 
+        // Neither lines nor an outline is a triangle of the mesh, and a layout of the texture has none.
+        let outlined = spec.clone().set("outline.thickness", "4").set("outline.unit", "px").line_width(3.0);
+        let with_lines = Renderer::cpu().faces(&mesh, &outlined, Watch::default()).unwrap();
+        assert!(with_lines.triangles.iter().all(|&id| id == FaceBuffer::NONE || id < 12));
+        let layout = spec.set("surface.debug", "uv-layout");
+        let layout = Renderer::cpu().faces(&mesh, &layout, Watch::default()).unwrap();
+        assert!(layout.triangles.iter().all(|&id| id == FaceBuffer::NONE));
+
         // In perspective, from an eye that is 3 units before the wall.
-        let spec = Spec::flat().size(33, 33).set("up", "z");
+        let spec = Spec::flat().size(33, 65).set("up", "z");
         let spec = spec.set("camera.eye", "[0.5,-3,0.5]").set("camera.target", "[0.5,0,0.5]");
         let faces = Renderer::cpu().faces(&mesh, &spec, Watch::default()).unwrap();
-        let middle = faces.depths[16 * 33 + 16];
+        let middle = faces.depths[32 * 33 + 16];
         assert!((middle - 3.0).abs() < 1e-4, "{middle}");
     }
 }

@@ -116,7 +116,8 @@ impl Spec {
     /// A named direction to look from.
     #[must_use]
     pub fn view(self, view: NamedView) -> Self {
-        self.set("view", word_for(view))
+        let spec = self.set("camera.azimuth_deg", "null").set("camera.elevation_deg", "null");
+        spec.set("view", word_for(view))
     }
 
     /// Another direction: degrees around the model, from its front to its right, and degrees above the ground.
@@ -145,7 +146,7 @@ impl Spec {
     }
 }
 
-/// Surface and lines.
+/// Surface and lines. A setter of lines turns lines on, where the style has none.
 impl Spec {
     /// The colour of surfaces that have none of their own: a CSS colour.
     #[must_use]
@@ -159,7 +160,7 @@ impl Spec {
         self.set("surface.opacity", opacity.to_string())
     }
 
-    /// The full width of lines, pixels.
+    /// The full width of lines, pixels; of the classic wire methods, the thickness in their own unit.
     #[must_use]
     pub fn line_width(self, width_px: f32) -> Self {
         self.set("wire.thickness", width_px.to_string())
@@ -268,6 +269,8 @@ mod tests {
         }"##;
         let limits = Limits::default();
         assert_eq!(typed.understood(&limits).unwrap(), Spec::from_json(document).understood(&limits).unwrap());
+        let turned = Spec::flat().direction(10.0, 10.0).view(NamedView::Top).understood(&limits).unwrap();
+        assert_eq!(turned, Spec::flat().view(NamedView::Top).understood(&limits).unwrap(), "the last one counts");
         let clear = Spec::auto().transparent().understood(&limits).unwrap();
         assert_eq!(clear, Spec::auto().set("background", "transparent").understood(&limits).unwrap());
     }
@@ -291,7 +294,7 @@ mod tests {
         let spec = Spec::flat().size(128, 128);
         spec.check(&Limits::default()).unwrap();
         assert!(spec.check(&limits).unwrap_err().to_string().contains("64"));
-        let deep = Spec::from_json(r#"{ "camera": { "eye": [1, 2, 3] } }"#);
+        let deep = Spec::from_json(r#"{ "camera": { "eye": [1, 2, 3], "target": [0, 0, 0] } }"#);
         deep.check(&Limits::default()).unwrap();
         deep.check(&limits).unwrap_err();
     }

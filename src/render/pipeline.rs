@@ -244,7 +244,8 @@ pub fn with_plan(
     deadline: &Deadline,
     then: impl FnOnce(&DrawPlan<'_>) -> Result<(), DrawError>,
 ) -> Result<(), RenderError> {
-    with_scene(model.view(), spec, true, budget, deadline, |staged, budget| {
+    let has_gpu = true; // that makes ready
+    with_scene(model.view(), spec, has_gpu, budget, deadline, |staged, budget| {
         Ok(then(&plan::build_from(&staged.scene, staged.prepared, budget, deadline)?)?)
     })
 }
@@ -390,7 +391,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Its name in headers, metrics and traces.
+    /// Its name in headers and traces.
     pub fn name(self) -> &'static str {
         match self {
             Self::Parse => "parse",

@@ -19,9 +19,15 @@ struct Stored {
 }
 
 /// Everything that `bless` knows.
-const STORED: [Stored; 4] = [
+const STORED: [Stored; 5] = [
     Stored { name: "pictures", filter: "render::golden::", write: ("MESHSNAP_GOLDEN", "write"), path: "tests/golden" },
     Stored { name: "schema", filter: "the_stored_schema", write: ("MESHSNAP_GOLDEN", "write"), path: "api" },
+    Stored {
+        name: "library",
+        filter: "house::library",
+        write: ("MESHSNAP_GOLDEN", "write"),
+        path: "src/library/interface.txt",
+    },
     Stored {
         name: "tables",
         filter: "the_shipped_table_is_what_was_measured",
@@ -184,11 +190,10 @@ fn look_into_archive(name: &str, options: &[&str]) -> Result {
         return Err(format!("the archive of {name} would hold {stray}: see its Cargo.toml"));
     }
     let folder = root().join("target/package");
-    let archives = std::fs::read_dir(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    let is_of_crate =
-        |file: &str| file.strip_prefix(name).is_some_and(|rest| rest.starts_with("-0") && rest.ends_with(".crate"));
-    let archive = archives.flatten().find(|entry| is_of_crate(&entry.file_name().to_string_lossy()));
-    let bytes = archive.and_then(|entry| entry.metadata().ok()).map_or(0, |data| data.len());
+    let manifest = std::fs::read_to_string(root().join("Cargo.toml")).unwrap_or_default();
+    let version = manifest.lines().find_map(|line| line.strip_prefix("version = \"")?.strip_suffix('"'));
+    let archive = folder.join(format!("{name}-{}.crate", version.unwrap_or_default()));
+    let bytes = std::fs::metadata(&archive).map_or(0, |data| data.len());
     println!("{name}: {} files, {bytes} bytes", files.lines().count());
     if bytes == 0 || bytes > ARCHIVE_BYTES_MAX {
         return Err(format!("the archive of {name} has {bytes} bytes, and may have 1 to {ARCHIVE_BYTES_MAX}"));
@@ -205,7 +210,7 @@ pub fn script(path: &str, arguments: &[&str]) -> Result {
 
 /// The suite's tests whose names contain one of the filters.
 fn suite(filters: &[&str]) -> Command {
-    let mut command = cargo(&["test", "--locked", "--test", "suite", "--"]);
+    let mut command = cargo(&["test", "--locked", "--workspace", "--test", "suite", "--"]);
     command.args(filters);
     command
 }

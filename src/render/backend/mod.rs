@@ -51,7 +51,7 @@ pub trait Renderer {
         self.draw(plan, deadline)
     }
 
-    /// Fills the visibility buffer alone, for tests that compare back-ends sample for sample.
+    /// Fills the visibility buffer alone.
     ///
     /// One word a sample at `(y * width + x) * samples + s`: depth bits in the upper half, the
     /// complement of the triangle id in the lower (so that of equal depths the lowest id wins), 0

@@ -1,14 +1,14 @@
 //! The face that each pixel of a view shows, for programs that draw over a picture themselves.
 
-use super::{Context, RenderError, Staged, View, with_scene};
+use super::{Context, RenderError, Stage, Staged, View, with_scene};
 use crate::backend::Renderer as _;
 use crate::plan;
 use crate::scene::Scene;
-
 use crate::spec::{ProjectionKind, Samples, Spec};
 
 /// The triangle that each pixel of a view shows at its centre, and how far away it is.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct FaceBuffer {
     /// Columns.
     pub width_px: u32,
@@ -31,13 +31,18 @@ impl FaceBuffer {
 pub fn find_faces(view: View<'_>, spec: &Spec, cx: &mut Context<'_>) -> Result<FaceBuffer, RenderError> {
     let mut spec = Spec { sheet: None, quality_target: None, ..spec.clone() };
     spec.image.samples = Samples::Fixed(1);
-    let Context { backends, budget, deadline, .. } = cx;
-    with_scene(view, &spec, false, budget, deadline, |Staged { scene, prepared, .. }, budget| {
+    let Context { backends, budget, deadline, ended } = cx;
+    with_scene(view, &spec, false, budget, deadline, |Staged { scene, prepared, is_uv_layout, .. }, budget| {
         let plan = plan::build_from(&scene, prepared, budget, deadline)?;
         let pixels = u64::from(plan.width_px) * u64::from(plan.height_px);
         budget.spend("the faces of the pixels", pixels, 16).map_err(plan::PlanError::Limit)?;
-        let words = backends.on_cpu().draw_visibility(&plan, deadline)?;
-        let count = scene.mesh.triangles.len() as u32;
+        let cpu = backends.on_cpu();
+        budget.spend("bands of the picture", cpu.bands_bytes(&plan), 1).map_err(plan::PlanError::Limit)?;
+        ended(Stage::Plan);
+        let words = cpu.draw_visibility(&plan, deadline)?;
+        ended(Stage::Render);
+        // The faces of a layout of the texture are none in space.
+        let count = if is_uv_layout { 0 } else { scene.mesh.triangles.len() as u32 };
         let triangle = |word: u64| Some(!(word as u32)).filter(|&id| word != 0 && id < count);
         let distance = |word: u64| distance(&scene, f32::from_bits((word >> 32) as u32));
         Ok(FaceBuffer {

@@ -176,7 +176,8 @@ fn compare(
         let has_failed = *may_fail && !compared.difference.same;
         return Ok(Product::Verdict { has_failed, json: written(compared.difference.json())? });
     };
-    ended(Stage::Judge);
+    // Comparing takes the place of planning.
+    ended(Stage::Plan);
     let output = opened::render_difference([&a, &b], &compared, spec, backends, deadline, ended)?;
     Ok(Product::Picture { output: Box::new(output), mesh_was_kept: false })
 }

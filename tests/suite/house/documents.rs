@@ -109,13 +109,13 @@ fn paths_are_found_and_looked_up() {
     }
 }
 
-/// The error codes of `Fault::Busy` in the code of a file. A code stands behind the fault, or is one of those that a
+/// The error codes of `ErrorKind::Busy` in the code of a file. A code stands behind the kind, or is one of those that a
 /// `let (code, ...) = match` before it chooses from.
 fn busy_codes(text: &str) -> Vec<String> {
     let literal =
         |text: &str| text.strip_prefix('"').and_then(|rest| rest.split_once('"')).map(|(code, _)| code.to_owned());
     let mut codes = Vec::new();
-    for (at, word) in text.match_indices("Fault::Busy") {
+    for (at, word) in text.match_indices("ErrorKind::Busy") {
         let after = text[at + word.len()..].trim_start_matches(',').trim_start();
         if let Some(code) = literal(after) {
             codes.push(code);

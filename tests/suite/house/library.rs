@@ -8,8 +8,8 @@ fn stored() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src/library/interface.txt")
 }
 
-/// Each public item of the crate `meshsnap`, one on a line, under the file that has it: signatures up to their body, and the
-/// names that are passed on from the renderer.
+/// Each public function, type and field of the crate `meshsnap`, one on a line, under the file that has it: signatures up to
+/// their body, and the names that are passed on from the renderer (not what those have).
 fn interface() -> String {
     let mut out = String::new();
     for (file, text) in sources().into_iter().filter(|(file, _)| file.starts_with("library/")) {
@@ -24,7 +24,10 @@ fn interface() -> String {
             } else if line.starts_with("pub ") && !line.contains('$') {
                 let mut item = line.to_owned();
                 // A signature or a list of names may go on in the lines that follow.
-                while !item.ends_with([';', '{', ',']) || item.matches('(').count() > item.matches(')').count() {
+                let is_list = item.starts_with("pub use ");
+                let is_open =
+                    |item: &str| if is_list { !item.ends_with(';') } else { !item.ends_with([';', '{', ',']) };
+                while is_open(&item) || item.matches('(').count() > item.matches(')').count() {
                     let Some(more) = lines.next() else { break };
                     item.push(' ');
                     item.push_str(more);
