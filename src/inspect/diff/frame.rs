@@ -1,4 +1,5 @@
-//! One frame for two meshes: that of the first one's unit box.
+//! Positions of two meshes in one space. Each mesh is stored in a unit box of its own, so before two are compared, the
+//! positions of one are brought into the unit box of the other.
 
 use meshsnap_render::mesh::{Mesh, ToFile};
 

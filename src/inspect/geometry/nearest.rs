@@ -1,7 +1,7 @@
 //! The point of a mesh that is nearest to another point, by a tree of boxes (a bounding volume
 //! hierarchy).
 //!
-//! All lengths are in the mesh's unit box, in f64.
+//! Distances are computed in f64, in units of the mesh's unit box. Positions are stored as the mesh has them, in f32.
 
 use meshsnap_render::limits::{Budget, LimitExceeded};
 use meshsnap_render::mesh::Mesh;

@@ -1,4 +1,5 @@
-//! The connected parts of a mesh, each with its own figures, and the loops of its open and sharp edges.
+//! The connected parts of a mesh, each with its own figures, and the loops of the mesh's open edges and of its sharp edges:
+//! those between faces that meet at a large angle.
 
 use serde::Serialize;
 

@@ -1,6 +1,7 @@
 //! Names that clients give their requests (`Idempotency-Key`), so that one that is sent again makes no second job.
 //!
-//! A claim lives as long as its job can be found, so that there are no more of them than jobs.
+//! A claim is such a name while it stands for a job. It lives as long as its job can be found, so that there are no more
+//! claims than jobs.
 
 use std::collections::HashMap;
 use std::fmt;

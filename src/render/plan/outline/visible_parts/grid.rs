@@ -1,7 +1,8 @@
-//! The faces that lie near silhouette edges on screen, by cells of a grid.
+//! The faces that may hide a part of an outline: those that lie near its edges on screen, listed by the cells of a grid over
+//! the picture.
 //!
-//! Cells are as small as faces usually are, so that a cell lists few of them; and only faces in the
-//! cells that edges go through are listed.
+//! Cells are about as large as a usual face, so that a cell lists few faces. Cells that no edge goes through list none. Faces
+//! and edges are clipped at the near plane before they are put on screen.
 
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
