@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::srgb::srgb_to_linear;
 
-/// The default of [`ImageSpec::effort`]: quick, because pictures are drawn more often than stored.
+/// The default of `image.effort`: quick, because pictures are drawn more often than stored.
 pub const DEFAULT_EFFORT: u32 = 3;
 
 /// Pixels in sRGB with straight (not premultiplied) alpha, 8 bits per channel, rows from the top.
@@ -33,6 +33,7 @@ pub(crate) trait SharedMemory: Send + Sync {
 #[derive(Clone)]
 enum Memory {
     Own(Vec<u8>),
+    #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "only a GPU writes into memory of its own"))]
     Shared(Arc<dyn SharedMemory>),
 }
 

@@ -1,4 +1,4 @@
-//! API keys: who may do what. Keys without a name come from a setting, named ones from a file ([`file`]), which is read
+//! API keys: who may do what. Keys without a name come from a setting, named ones from a file ([`mod@file`]), which is read
 //! again on request. Only digests of keys are kept.
 //!
 //! Architecture invariant: a file that cannot be read changes nothing, so that no mistake opens the server or locks

@@ -1,6 +1,6 @@
 //! Stage visibility, many triangles at a time: set-up in lanes, and a short way for small ones.
 //!
-//! Larger triangles are drawn in the blocks of [`visibility`](super::visibility).
+//! Larger triangles are drawn in the blocks of `visibility`.
 
 use super::nearest::{Nearest, update};
 use super::samples::SampleBand;

@@ -135,7 +135,7 @@ impl Setups {
 }
 
 impl Parts<LANES> {
-    /// Edges and depth, as `Setup`, `Edges::new` and `Edges::at` of [`visibility`] have them.
+    /// Edges and depth, as `Setup`, `Edges::new` and `Edges::at` of `visibility` have them.
     #[inline(always)]
     fn set_lane(&mut self, l: usize, x: [i32; 3], y: [i32; 3], z: [f32; 3], corner: [i32; 2]) {
         let cross = |ax: i32, ay: i32, bx: i32, by: i32| ax.wrapping_mul(by).wrapping_sub(bx.wrapping_mul(ay));

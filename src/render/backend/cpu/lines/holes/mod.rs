@@ -1,7 +1,7 @@
 //! Stage lines, per pixel: the area that lines leave free if all edges of a surface are drawn. Twin
 //! of `shaders/lines/holes/holes.wgsl`.
 //!
-//! If each side of each face is a line, then a face is free only in its [inset](inset): the part
+//! If each side of each face is a line, then a face is free only in its [inset]: the part
 //! that is at least half a line's width from all three sides. Insets of different faces do not
 //! overlap. So the free area of a pixel is the sum of the insets' areas in it, and no line has to
 //! be drawn.
