@@ -15,13 +15,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mesh = Mesh::read(&std::fs::read(input)?)?;
     let mut renderer = Renderer::cpu();
 
-    // Lines alone, over nothing; the faces hide those behind them.
-    let wires = Spec::wire().size(512, 512).transparent().line_width(1.5).set("surface.opacity", "0");
-    let faces = renderer.faces(&mesh, &Spec::wire().size(512, 512).line_width(1.5), Watch::default())?;
-    let wires = renderer.render(&mesh, &wires)?;
+    // Black lines on white, hidden by the faces before them.
+    let spec = Spec::hidden_line().size(512, 512);
+    let lines = renderer.render(&mesh, &spec)?;
+    let faces = renderer.faces(&mesh, &spec, Watch::default())?;
 
     let mut pixels = own_pixels(&faces);
-    lay_over(&mut pixels, &wires);
+    multiply(&mut pixels, &lines);
     let image = Image { width_px: faces.width_px, height_px: faces.height_px, rgba: pixels.into() };
     std::fs::write(output, image.to_png()?)?;
     println!(
@@ -48,12 +48,9 @@ fn own_pixels(faces: &FaceBuffer) -> Vec<u8> {
     faces.triangles.iter().zip(&faces.depths).flat_map(pixel).collect()
 }
 
-/// Lays a picture with transparency over opaque pixels of the same size.
-fn lay_over(pixels: &mut [u8], picture: &Image) {
-    for (under, over) in pixels.chunks_exact_mut(4).zip(picture.rgba.chunks_exact(4)) {
-        let alpha = u32::from(over[3]);
-        for (under, &over) in under.iter_mut().zip(over).take(3) {
-            *under = ((u32::from(over) * alpha + u32::from(*under) * (255 - alpha)) / 255) as u8;
-        }
+/// Multiplies pixels by those of a picture of the same size: white leaves them as they are, black covers them.
+fn multiply(pixels: &mut [u8], picture: &Image) {
+    for (pixel, &factor) in pixels.iter_mut().zip(picture.rgba.iter()) {
+        *pixel = (u32::from(*pixel) * u32::from(factor) / 255) as u8;
     }
 }
