@@ -1,4 +1,4 @@
-//! What meshsnap says about meshes: [`report`]s on one, [`check`]s by rules, and the [`diff`]erence of two.
+//! Statements about meshes: the [`report`] on one, its [`check`] by rules, and the [`diff`] of two.
 //!
 //! [`opened`] has the files that are judged or compared, and the pictures of what was found. [`geometry`] answers questions
 //! that drawing does not ask.

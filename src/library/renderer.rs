@@ -51,7 +51,7 @@ pub struct Picture {
     pub warnings: Vec<Warning>,
 }
 
-/// What a caller hears of a picture while it is drawn, and a way to stop it.
+/// The progress of a picture while it is drawn, and a way to stop it.
 ///
 /// ```
 /// use meshsnap::{Deadline, Watch};

@@ -22,7 +22,7 @@ use crate::Error;
 /// # Ok::<(), meshsnap::Error>(())
 /// ```
 ///
-/// What has no setter is a key of the request document, the same as over HTTP and on the command line
+/// Everything else is a key of the request document, the same as over HTTP and on the command line
 /// (docs/request.md lists them):
 ///
 /// ```
@@ -178,7 +178,7 @@ impl Spec {
         self.set("wire.edges", word_for(edges))
     }
 
-    /// What becomes of lines behind a surface.
+    /// The treatment of lines behind a surface.
     #[must_use]
     pub fn hidden_lines(self, hidden: Hidden) -> Self {
         self.set("wire.hidden", word_for(hidden))

@@ -25,7 +25,7 @@ use crate::sheet::{self, Canvas, Cell, Layout};
 use crate::spec::{Sheet, Spec};
 use crate::warning::Warning;
 
-/// What a picture is drawn with, and what it may cost.
+/// The back-ends that draw a picture, the memory and time that it may take, and the listener to its stages.
 pub struct Context<'a> {
     /// The back-ends.
     pub backends: &'a mut Backends,
@@ -266,7 +266,7 @@ pub struct Model {
 pub struct View<'a> {
     /// The mesh.
     pub mesh: &'a Mesh,
-    /// What pictures of it have found out.
+    /// Facts about the mesh, such as its edges, that earlier pictures have found.
     pub prepared: &'a Prepared,
     /// Positions in the mesh's unit box to which the camera is fitted; None: those of the mesh.
     pub framing: Option<&'a [[f32; 3]]>,
