@@ -1,8 +1,8 @@
 //! Stage mixed, per triangle and pixel: tests of a pixel's points in AVX2 instructions, eight points at a time.
 
-#![allow(unsafe_code)]
-
 use std::arch::x86_64::*;
+
+use bytemuck::must_cast;
 
 use super::Plane;
 use crate::backend::cpu::isa::LANES;
@@ -42,7 +42,7 @@ impl<const W: usize> Steps<W> {
 pub fn outside<const W: usize>([c, dx, dy]: [i32; 3]) -> PointSet<W> {
     // All sums are modulo 2^32.
     let along = |change: i32, places: &[[i32; 64]; W]| {
-        _mm256_mullo_epi32(_mm256_set1_epi32(change), load(&places[0].as_chunks::<LANES>().0[0]))
+        _mm256_mullo_epi32(_mm256_set1_epi32(change), must_cast(places[0].as_chunks::<LANES>().0[0]))
     };
     let start = _mm256_sub_epi32(along(dx, &Lattice::<W>::PLACES[1]), along(dy, &Lattice::<W>::PLACES[0]));
     let mut value = _mm256_add_epi32(_mm256_set1_epi32(c), start);
@@ -55,7 +55,7 @@ pub fn outside<const W: usize>([c, dx, dy]: [i32; 3]) -> PointSet<W> {
             let mut four = [value; 4];
             for (own, wraps) in four.iter_mut().zip(wraps) {
                 *own = value;
-                let wrap = _mm256_and_si256(pixel, load(wraps));
+                let wrap = _mm256_and_si256(pixel, must_cast(*wraps));
                 value = _mm256_add_epi32(value, _mm256_sub_epi32(step, wrap));
             }
             // Narrowing keeps signs, and interleaves the halves of vectors.
@@ -83,7 +83,7 @@ pub fn nearer<const W: usize>(own: &Plane, other: &Plane, points: PointSet<W>, w
             if asked == 0 {
                 continue;
             }
-            let places = [load(columns), load(rows)];
+            let places = [must_cast(*columns), must_cast(*rows)];
             let [own, other] = [depths(own, places), depths(other, places)];
             let is_tie = _mm256_and_ps(_mm256_cmp_ps::<_CMP_EQ_OQ>(own, other), ties);
             let is_nearer = _mm256_or_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(own, other), is_tie);
@@ -106,11 +106,4 @@ fn depths(plane: &Plane, places: [__m256i; 2]) -> __m256 {
     let depth = _mm256_add_ps(_mm256_add_ps(_mm256_set1_ps(plane.depth[0]), along(0)), along(1));
     let depth = _mm256_max_ps(depth, _mm256_set1_ps(plane.range[0]));
     _mm256_min_ps(depth, _mm256_set1_ps(plane.range[1]))
-}
-
-#[inline]
-#[target_feature(enable = "avx2")]
-fn load(lanes: &[i32; LANES]) -> __m256i {
-    // SAFETY: the array has the 32 bytes that are read, and any alignment will do.
-    unsafe { _mm256_loadu_si256(lanes.as_ptr().cast()) }
 }

@@ -4,9 +4,9 @@
 //! The same bits as [`trilinear_plainly`](super::trilinear_plainly) and [`mean_plainly`](super::mean_plainly), of which
 //! compilers make branches and single components.
 
-#![allow(unsafe_code)]
-
 use std::arch::x86_64::*;
+
+use bytemuck::must_cast;
 
 use super::{Level, Places};
 use crate::backend::cpu::geometry::transform::quick_recip;
@@ -26,9 +26,9 @@ pub fn trilinear(
     let pair = Pair::of(_mm_setr_ps(u, v, u, v), sizes, modes(sampler));
     let color = pair.color(texels, 0, &level);
     if next.is_none() {
-        return to_floats(color);
+        return must_cast(color);
     }
-    to_floats(mix(color, pair.color(texels, 1, &second), _mm_set1_ps(share)))
+    must_cast(mix(color, pair.color(texels, 1, &second), _mm_set1_ps(share)))
 }
 
 /// As [`mean_plainly`](super::mean_plainly) of [`bilinear`](super::bilinear).
@@ -49,7 +49,7 @@ pub fn mean(texels: &[[u16; 4]], places: &Places, sampler: u32) -> [f32; 4] {
             sum = _mm_add_ps(sum, pair.color(texels, 1, &places.levels[second]));
         }
     }
-    to_floats(_mm_mul_ps(sum, _mm_set1_ps(quick_recip(places.taps as f32))))
+    must_cast(_mm_mul_ps(sum, _mm_set1_ps(quick_recip(places.taps as f32))))
 }
 
 /// Two places, each in a level, and the texels around them.
@@ -73,9 +73,9 @@ impl Pair {
         let before = _mm_cvttps_epi32(floor);
         let after = _mm_add_epi32(before, _mm_set1_epi32(1));
         Self {
-            before: to_ints(within(before, sizes, repeats)),
-            after: to_ints(within(after, sizes, repeats)),
-            shares: to_floats(_mm_sub_ps(at, floor)),
+            before: must_cast(within(before, sizes, repeats)),
+            after: must_cast(within(after, sizes, repeats)),
+            shares: must_cast(_mm_sub_ps(at, floor)),
         }
     }
 
@@ -133,30 +133,11 @@ fn within(i: __m128i, sizes: __m128i, repeats: __m128i) -> __m128i {
 #[target_feature(enable = "avx2,f16c")]
 fn texel(texels: &[[u16; 4]], index: u32) -> __m128 {
     let Some(texel) = texels.get(index as usize) else { return _mm_set1_ps(1.0) };
-    // SAFETY: the array has the 64 bits that are loaded, and the load needs no alignment.
-    _mm_cvtph_ps(unsafe { _mm_loadl_epi64(texel.as_ptr().cast()) })
+    _mm_cvtph_ps(_mm_cvtsi64_si128(must_cast(*texel)))
 }
 
 #[inline]
 #[target_feature(enable = "avx2,f16c")]
 fn mix(a: __m128, b: __m128, share: __m128) -> __m128 {
     _mm_add_ps(a, _mm_mul_ps(_mm_sub_ps(b, a), share))
-}
-
-#[inline]
-#[target_feature(enable = "avx2,f16c")]
-fn to_floats(v: __m128) -> [f32; 4] {
-    let mut out = [0.0; 4];
-    // SAFETY: the array has the size of a vector, and the store needs no alignment.
-    unsafe { _mm_storeu_ps(out.as_mut_ptr(), v) };
-    out
-}
-
-#[inline]
-#[target_feature(enable = "avx2,f16c")]
-fn to_ints(v: __m128i) -> [i32; 4] {
-    let mut out = [0; 4];
-    // SAFETY: the array has the size of a vector, and the store needs no alignment.
-    unsafe { _mm_storeu_si128(out.as_mut_ptr().cast(), v) };
-    out
 }

@@ -1,7 +1,5 @@
 //! Stage mixed, per row: tests of `differing` in AVX2 instructions, two pixels in a vector.
 
-#![allow(unsafe_code)]
-
 use std::arch::x86_64::*;
 
 use super::{Ids, OUTERMOST, WORD};
@@ -47,7 +45,5 @@ pub fn word(own: &[Ids; WORD + 1], above: &[Ids; WORD]) -> u64 {
 #[inline]
 #[target_feature(enable = "avx2")]
 fn load<const N: usize>(pixels: &[Ids; N], first: usize) -> __m256i {
-    let pixels = pixels[first..].first_chunk::<PIXELS>().unwrap_or(&[[0; 4]; PIXELS]);
-    // SAFETY: two pixels have the size of a vector, and the load needs no alignment.
-    unsafe { _mm256_loadu_si256(pixels.as_ptr().cast()) }
+    bytemuck::must_cast(*pixels[first..].first_chunk::<PIXELS>().unwrap_or(&[[0; 4]; PIXELS]))
 }
