@@ -245,7 +245,7 @@ impl OutermostSamples {
 /// No two samples share a row or a column. Their mean is the pixel's centre. All coordinates have
 /// the same remainder modulo 16. With 16 samples it is 8, because as many rows and columns have no
 /// symmetric places in sixteenths otherwise.
-pub fn sample_offsets(samples: u32) -> &'static [[i32; 2]] {
+pub const fn sample_offsets(samples: u32) -> &'static [[i32; 2]] {
     const fn scaled<const N: usize>(mut sixteenths: [[i32; 2]; N], shift: i32) -> [[i32; 2]; N] {
         let mut s = 0;
         while s < N {

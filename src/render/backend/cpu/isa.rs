@@ -1,60 +1,37 @@
 //! One source, several instruction sets.
 //!
-//! The hot loops of every stage are written once, over arrays of [`LANES`] values, and compiled
-//! once per instruction set. Rust neither fuses nor reorders floating-point operations, so all give
-//! the same bytes; only the speed differs.
+//! The hot loops of every stage are written once and compiled once per instruction set. Most are plain loops over arrays of
+//! [`LANES`] values, which [`dispatch`] compiles. The innermost steps are written in the vectors of the crate
+//! `fearless_simd`, and [`with_simd`] and [`with_widest_simd`] compile them. Files called `avx2.rs` and `avx512.rs` hold second
+//! bodies of steps for which that crate lacks instructions. Rust neither fuses nor reorders floating-point
+//! operations, so all give the same bytes; only the speed differs.
 //!
-//! The innermost steps of triangles and of lines are an exception: they have a second version in AVX2
-//! instructions, in files called `avx2.rs` or `*_avx2.rs`, and the innermost of all a third one in AVX-512,
-//! `geometry/batch_avx512.rs` and `mixed/triangle/avx512.rs`.
+//! Such code calls no closure that has or makes vectors: the compiler may leave it a function of its own, compiled for the
+//! baseline.
 //!
-//! To add an instruction set (NEON): a variant of `Level` under its `cfg`, a list of
-//! features beside [`for_avx2_features`], a constructor that detects all of them, and an arm in
-//! [`dispatch`].
+//! To add an instruction set: a variant of [`Level`] that holds its token, a constructor, and arms in the macros.
+
+#[cfg(target_arch = "x86_64")]
+use fearless_simd::x86::{Avx2, Avx512};
 
 /// Values handled side by side: one AVX2 register of 32-bit numbers.
 pub const LANES: usize = 8;
 
 /// An instruction set that this processor is known to have.
-///
-/// The type is opaque and its constructors detect what they return, so safe code cannot choose an
-/// instruction set that the processor lacks:
-///
-/// ```compile_fail
-/// let isa = crate::backend::cpu::Isa::Avx2;
-/// ```
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 pub struct Isa(Level);
 
-/// Never made outside of [`Isa`]'s constructors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Level {
+/// An instruction set, with the token of `fearless_simd` that proves that the processor has it.
+#[derive(Clone, Copy)]
+pub(in crate::backend::cpu) enum Level {
+    /// The instructions that every processor of this architecture has.
     Baseline,
+    /// AVX2, and what processors have that have it (x86-64-v3).
     #[cfg(target_arch = "x86_64")]
-    Avx2,
-    /// AVX2, and the first part of AVX-512.
+    Avx2(Avx2),
+    /// AVX-512 as of Ice Lake and Zen 4.
     #[cfg(target_arch = "x86_64")]
-    Avx512,
-}
-
-/// Calls a macro with the features of the AVX2 level, followed by its own input: detection and
-/// compilation cannot name different ones. Those that AVX2 implies are named as well, because
-/// enabling it enables them.
-macro_rules! for_avx2_features {
-    ($($callback:ident)::+ ! { $($input:tt)* }) => {
-        $($callback)::+! {
-            ["sse3" "ssse3" "sse4.1" "sse4.2" "avx" "avx2" "f16c" "bmi1" "bmi2" "lzcnt" "popcnt"]
-            $($input)*
-        }
-    };
-}
-
-/// True if the processor reports every feature of a list.
-#[cfg(target_arch = "x86_64")]
-macro_rules! are_detected {
-    ([$($feature:tt)+]) => {
-        $(std::arch::is_x86_feature_detected!($feature))&&+
-    };
+    Avx512(Avx512),
 }
 
 impl Isa {
@@ -78,45 +55,51 @@ impl Isa {
         match self.0 {
             Level::Baseline => "baseline",
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2 => "avx2",
+            Level::Avx2(_) => "avx2",
             #[cfg(target_arch = "x86_64")]
-            Level::Avx512 => "avx512",
+            Level::Avx512(_) => "avx512",
         }
     }
 
-    /// True if code compiled for the AVX2 level may run.
+    /// With its token.
+    #[inline(always)]
+    pub(in crate::backend::cpu) fn level(self) -> Level {
+        self.0
+    }
+
+    /// The token of AVX2, where the processor may run code compiled for it.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub(in crate::backend::cpu) fn as_avx2(self) -> Option<Avx2> {
+        match self.0 {
+            Level::Baseline => None,
+            Level::Avx2(simd) => Some(simd),
+            Level::Avx512(simd) => fearless_simd::Simd::level(simd).as_avx2(),
+        }
+    }
+
+    /// True if code compiled for AVX2 may run.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     pub(in crate::backend::cpu) fn has_avx2(self) -> bool {
-        matches!(self.0, Level::Avx2 | Level::Avx512)
+        !matches!(self.0, Level::Baseline)
     }
 
-    /// True if code compiled for the AVX-512 level may run.
+    /// True if code compiled for AVX-512 may run.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     pub(in crate::backend::cpu) fn has_avx512(self) -> bool {
-        self.0 == Level::Avx512
-    }
-
-    /// True if the steps of `geometry::batch` are written in this level's own instructions.
-    #[inline(always)]
-    pub(in crate::backend::cpu) fn has_own_batch(self) -> bool {
-        #[cfg(target_arch = "x86_64")]
-        return self.has_avx2();
-        #[cfg(not(target_arch = "x86_64"))]
-        return false;
+        matches!(self.0, Level::Avx512(_))
     }
 
     #[cfg(target_arch = "x86_64")]
     fn avx2() -> Option<Self> {
-        for_avx2_features!(are_detected! {}).then_some(Self(Level::Avx2))
+        fearless_simd::Level::new().as_avx2().map(|simd| Self(Level::Avx2(simd)))
     }
 
     #[cfg(target_arch = "x86_64")]
     fn avx512() -> Option<Self> {
-        // Those that AVX-512 implies are named as well.
-        let are_there = are_detected!(["fma" "f16c" "avx512f"]);
-        (Self::avx2().is_some() && are_there).then_some(Self(Level::Avx512))
+        fearless_simd::Level::new().as_avx512().map(|simd| Self(Level::Avx512(simd)))
     }
 
     #[cfg(not(target_arch = "x86_64"))]
@@ -127,6 +110,12 @@ impl Isa {
     #[cfg(not(target_arch = "x86_64"))]
     fn avx512() -> Option<Self> {
         None
+    }
+}
+
+impl PartialEq for Isa {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name()
     }
 }
 
@@ -136,36 +125,28 @@ impl std::fmt::Debug for Isa {
     }
 }
 
-/// Defines `$name(isa, args...)`, which runs `$kernel(args...)` compiled for `isa`. The kernel and
-/// what it calls in its loops must be `#[inline(always)]`, or they stay compiled for the baseline.
-macro_rules! dispatch {
-    ($($function:tt)*) => {
-        $crate::backend::cpu::isa::for_avx2_features! { $crate::backend::cpu::isa::dispatch_to! { $($function)* } }
-    };
+/// The token of the baseline.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+#[allow(unsafe_code)]
+pub(in crate::backend::cpu) fn baseline() -> fearless_simd::x86::Sse2 {
+    // SAFETY: every processor of this architecture has SSE2.
+    unsafe { fearless_simd::x86::Sse2::assume_supported() }
 }
 
-/// [`dispatch`], given the features.
-macro_rules! dispatch_to {
-    (
-        [$($feature:tt)+]
-        $(#[$doc:meta])* pub fn $name:ident($($arg:ident: $ty:ty),* $(,)?) = $kernel:path
-    ) => {
+/// Defines `$name(isa, args...)`, which runs `$kernel(args...)` compiled for the baseline or AVX2. The kernel and
+/// what it calls in its loops must be `#[inline(always)]`, or they stay compiled for the baseline.
+macro_rules! dispatch {
+    ($(#[$doc:meta])* pub fn $name:ident($($arg:ident: $ty:ty),* $(,)?) = $kernel:path) => {
         $(#[$doc])*
-        #[allow(unsafe_code)]
         pub fn $name(isa: $crate::backend::cpu::isa::Isa, $($arg: $ty),*) {
             #[cfg(target_arch = "x86_64")]
-            {
-                #[inline(never)]
-                $(#[target_feature(enable = $feature)])+
-                fn avx2($($arg: $ty),*) {
-                    $kernel($($arg),*)
-                }
-                if isa.has_avx2() {
-                    // SAFETY: `has_avx2` is true only of a value that `Isa::avx2` has made, or `Isa::avx512` after
-                    // asking it. It makes one where the processor reports every feature that `avx2` above
-                    // enables: both lists are `for_avx2_features`'s.
-                    return unsafe { avx2($($arg),*) };
-                }
+            if let Some(simd) = isa.as_avx2() {
+                return fearless_simd::Simd::vectorize(
+                    simd,
+                    #[inline(always)]
+                    move || $kernel($($arg),*),
+                );
             }
             let _ = isa;
             $kernel($($arg),*)
@@ -173,7 +154,54 @@ macro_rules! dispatch_to {
     };
 }
 
-pub(super) use {dispatch, dispatch_to, for_avx2_features};
+/// Evaluates an expression in vectors of [`LANES`] values, given the token by which they are made: that of AVX2 or of
+/// the baseline. What it calls must be `#[inline(always)]`.
+macro_rules! with_simd {
+    ($isa:expr, $simd:ident => $body:expr) => {{
+        #[cfg(target_arch = "x86_64")]
+        {
+            if let Some($simd) = $isa.as_avx2() {
+                fearless_simd::Simd::vectorize(
+                    $simd,
+                    #[inline(always)]
+                    || $body,
+                )
+            } else {
+                let $simd = $crate::backend::cpu::isa::baseline();
+                $body
+            }
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        {
+            let _ = $isa;
+            fearless_simd::dispatch!(fearless_simd::Level::baseline(), $simd => $body)
+        }
+    }};
+}
+
+/// As [`with_simd`], in vectors of the processor's own width: also those of AVX-512.
+macro_rules! with_widest_simd {
+    ($isa:expr, $simd:ident => $body:expr) => {{
+        #[cfg(target_arch = "x86_64")]
+        {
+            if let $crate::backend::cpu::isa::Level::Avx512($simd) = $isa.level() {
+                fearless_simd::Simd::vectorize(
+                    $simd,
+                    #[inline(always)]
+                    || $body,
+                )
+            } else {
+                $crate::backend::cpu::isa::with_simd!($isa, $simd => $body)
+            }
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        {
+            $crate::backend::cpu::isa::with_simd!($isa, $simd => $body)
+        }
+    }};
+}
+
+pub(super) use {dispatch, with_simd, with_widest_simd};
 
 #[cfg(test)]
 mod tests {
@@ -204,17 +232,22 @@ mod tests {
         }
     }
 
-    /// AVX2 without the bit-manipulation extensions, as some hypervisors present it, is the
-    /// baseline.
+    /// Each instruction set runs its own code, in vectors of its own width.
     #[cfg(target_arch = "x86_64")]
     #[test]
-    fn every_enabled_feature_is_detected() {
-        macro_rules! missing {
-            ([$($feature:tt)+]) => {
-                [$((!std::arch::is_x86_feature_detected!($feature)).then_some($feature)),+]
-            };
+    fn each_instruction_set_has_its_width() {
+        #[inline(always)]
+        fn width<V: fearless_simd::Simd>(_: V) -> usize {
+            size_of::<V::f32s>() / size_of::<f32>()
         }
-        let missing: Vec<&str> = for_avx2_features!(missing! {}).into_iter().flatten().collect();
-        assert_eq!(missing.is_empty(), Isa::detect().has_avx2(), "{missing:?}");
+        for isa in Isa::available() {
+            let (eight, widest) = (with_simd!(isa, simd => width(simd)), with_widest_simd!(isa, simd => width(simd)));
+            let want = match isa.name() {
+                "baseline" => [4, 4],
+                "avx2" => [8, 8],
+                _ => [8, 16],
+            };
+            assert_eq!([eight, widest], want, "{isa:?}");
+        }
     }
 }

@@ -24,7 +24,7 @@ pub struct KeptFaces {
 
 /// A triangle and its box.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct BoxedFace {
     pub id: u32,
     /// First and last column of pixels that may have samples of it, as a [`pair`].

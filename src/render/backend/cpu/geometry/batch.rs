@@ -2,15 +2,18 @@
 //!
 //! Larger triangles are drawn in the blocks of `visibility`.
 
-use super::nearest::{Nearest, update};
-use super::samples::SampleBand;
-use super::setups::{Boxes, Corners, Setups, class, lane_offsets};
+use fearless_simd::prelude::*;
+
+use super::nearest::Nearest;
+use super::samples::{HANGOVER, SampleBand};
+use super::setups::{Boxes, Setups, class};
 use super::tiles::Tiles;
 use super::visibility;
 use super::visibility::{Parts, Setup};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::BoxedFace;
-use crate::backend::cpu::isa::{Isa, LANES};
+use crate::backend::cpu::isa::{Isa, LANES, with_simd, with_widest_simd};
+use crate::plan::sample_offsets;
 
 /// Triangles in a batch. Triangles of equal size are drawn one after the other, so that the
 /// processor predicts the lengths of the loops over their rows and columns.
@@ -79,12 +82,13 @@ impl Batch {
         self.ids[len..len.next_multiple_of(LANES)].fill(last);
         let (groups, _) = self.ids.as_chunks::<LANES>();
         for (ids, setups) in groups.iter().zip(&mut self.setups).take(len.div_ceil(LANES)) {
-            set_up::<S>(context, ids, band, setups);
+            with_simd!(context.isa, simd => setups.set::<_, S>(simd, context, ids, band));
         }
         let (order, ends) = self.by_class(len);
         for &i in &order[..ends[class::SHORT as usize]] {
             let (group, l) = (usize::from(i) / LANES, usize::from(i) % LANES);
-            draw_lane::<S, LANES>(context.isa, &self.setups[group].parts, l, self.ids[usize::from(i)], band);
+            let (isa, part, id) = (context.isa, &self.setups[group].parts, self.ids[usize::from(i)]);
+            with_widest_simd!(isa, simd => draw_lane::<_, S, LANES>(simd, part, l, id, band));
         }
         let mut tested = 0;
         for &i in &order[ends[class::SHORT as usize]..ends[class::LONG as usize]] {
@@ -120,100 +124,113 @@ impl Batch {
 
 /// Pixels and nearest depth of eight triangles.
 #[inline(always)]
-#[allow(unsafe_code)]
 pub fn boxes<const S: usize>(context: &RasterContext<'_>, ids: &[u32; LANES], band: &SampleBand) -> Boxes {
-    #[cfg(target_arch = "x86_64")]
-    if context.isa.has_avx2() {
-        // SAFETY: the processor has AVX2, as `isa` says.
-        return unsafe { super::batch_avx2::boxes::<S>(context, ids, band) };
-    }
-    Boxes::new::<S>(&Corners::load(context, ids), band)
-}
-
-#[inline(always)]
-#[allow(unsafe_code)]
-fn set_up<const S: usize>(context: &RasterContext<'_>, ids: &[u32; LANES], band: &SampleBand, setups: &mut Setups) {
-    #[cfg(target_arch = "x86_64")]
-    if context.isa.has_avx2() {
-        // SAFETY: the processor has AVX2, as `isa` says.
-        return unsafe { super::batch_avx2::set_up::<S>(context, ids, band, setups) };
-    }
-    *setups = Setups::new::<S>(&Corners::load(context, ids), band);
+    with_simd!(context.isa, simd => Boxes::new::<_, S>(simd, context, ids, band))
 }
 
 /// Draws a triangle block by block. Returns the number of samples tested.
 #[inline(always)]
 fn draw_long<const S: usize>(context: &RasterContext<'_>, setup: &Setup, id: u32, band: &mut SampleBand) -> u64 {
-    if !context.isa.has_own_batch() || setup.depth_range[0] <= 0.0 {
+    if setup.depth_range[0] <= 0.0 {
         return visibility::draw::<S>(setup, id, &mut Nearest(band));
     }
     let mut parts = 0;
     let (size_px, range) = (band.size_px, band.range());
     visibility::for_each_part::<S>(setup, size_px, range, |part| {
-        draw_lane::<S, 1>(context.isa, part, 0, id, band);
+        with_widest_simd!(context.isa, simd => draw_lane::<_, S, 1>(simd, part, 0, id, band));
         parts += 1;
     });
     parts * (64 * S as u64)
 }
 
 /// Draws part `l` of a triangle whose depths are above 0.
+///
+/// Goes down, then to the right: so less changes from a vector to the next, and all of it is in registers. Vectors may
+/// reach 15 columns beyond a block of large triangles. There edge functions still fit 32 bits: 2^30, to which they are
+/// clamped, and at most 2^29 + 2^28 from there.
 #[inline(always)]
-#[allow(unsafe_code)]
-fn draw_lane<const S: usize, const N: usize>(isa: Isa, parts: &Parts<N>, l: usize, id: u32, band: &mut SampleBand) {
-    #[cfg(target_arch = "x86_64")]
-    if isa.has_avx512() {
-        // SAFETY: the processor has AVX-512, as `isa` says.
-        return unsafe { super::batch_avx512::draw_lane::<S, N>(parts, l, id, band) };
+fn draw_lane<V: Simd, const S: usize, const N: usize>(simd: V, t: &Parts<N>, l: usize, id: u32, band: &mut SampleBand) {
+    let lanes = V::i32s::LEN;
+    let [[left, right], [top, bottom]] = t.bounds_of(l);
+    let pixels = (lanes / S).max(1);
+    let (rows, vectors) = ((bottom - top) as u32 as usize, (right - left) as u32 as usize / pixels);
+    // From the first sample to the end of the last vector.
+    let (first, stride) = (band.index(left, top, 0), band.stride);
+    let width = (vectors + 1) * (pixels * S);
+    let end = rows.saturating_mul(stride).saturating_add(width).saturating_add(first);
+    let (Some(depths), Some(ids)) = (band.depth.get_mut(first..end), band.ids.get_mut(first..end)) else { return };
+    let id = V::u32s::splat(simd, id);
+    let range = [V::f32s::splat(simd, t.depth_range[0][l]), V::f32s::splat(simd, t.depth_range[1][l])];
+    let (mut downs, mut rights) = ([V::i32s::splat(simd, 0); 3], [V::i32s::splat(simd, 0); 3]);
+    for k in 0..3 {
+        downs[k] = V::i32s::splat(simd, 16 * t.dx[k][l]);
+        rights[k] = V::i32s::splat(simd, 16 * pixels as i32 * t.dy[k][l]);
     }
-    #[cfg(target_arch = "x86_64")]
-    if isa.has_avx2() {
-        // SAFETY: the processor has AVX2, as `isa` says.
-        return unsafe { super::batch_avx2::draw_lane::<S, N>(parts, l, id, band) };
+    for part in 0..S.div_ceil(lanes) {
+        let [offset_x, offset_y] = offsets::<V, S>(simd, part);
+        let mut edges = [offset_x; 3];
+        for k in 0..3 {
+            edges[k] = offset_y * t.dx[k][l] - offset_x * t.dy[k][l] + t.edges[k][l];
+        }
+        // Floats hold these integers, which are below 2^24.
+        let mut x = V::f32s::float_from((offset_x << 4) + t.from[0][l]);
+        let first_y = V::f32s::float_from((offset_y << 4) + t.from[1][l]);
+        for vector in 0..=vectors {
+            let across = x * t.depth[1][l] + t.depth[0][l];
+            let [mut e0, mut e1, mut e2] = edges;
+            let mut y = first_y;
+            let mut at = vector * (pixels * S) + lanes * part;
+            for _ in 0..=rows {
+                let samples = at..at + lanes;
+                let (Some(depths), Some(ids)) = (depths.get_mut(samples.clone()), ids.get_mut(samples)) else { return };
+                let z = (across + y * t.depth[2][l]).max(range[0]).min(range[1]);
+                update(simd, e0 | e1 | e2, z, id, depths, ids);
+                (e0, e1, e2) = (e0 + downs[0], e1 + downs[1], e2 + downs[2]);
+                y += 256.0;
+                at += stride;
+            }
+            for k in 0..3 {
+                edges[k] -= rights[k];
+            }
+            x += (256 * pixels) as f32;
+        }
     }
-    let _ = isa;
-    draw_part::<S, N>(parts, l, id, band);
 }
 
+/// As [`update`](super::nearest::update), for depths above 0.
 #[inline(always)]
-fn draw_part<const S: usize, const N: usize>(parts: &Parts<N>, l: usize, id: u32, band: &mut SampleBand) {
-    let [[left, right], [top, bottom]] = parts.bounds_of(l);
-    let [dx, dy, edges] = [&parts.dx, &parts.dy, &parts.edges].map(|v| [v[0][l], v[1][l], v[2][l]]);
-    let from = [parts.from[0][l], parts.from[1][l]];
-    let depth = [parts.depth[0][l], parts.depth[1][l], parts.depth[2][l]];
-    let depth_range = [parts.depth_range[0][l], parts.depth_range[1][l]];
-    let pixels = (LANES / S).max(1);
-    for part in 0..S.div_ceil(LANES) {
-        let [offset_x, offset_y] = lane_offsets::<S>(part);
-        let (mut steps, mut x) = ([[0; LANES]; 3], [0; LANES]);
-        for i in 0..LANES {
-            for k in 0..3 {
-                steps[k][i] = edges[k] + (dx[k] * offset_y[i] - dy[k] * offset_x[i]);
-            }
-            x[i] = from[0] + 16 * offset_x[i];
+fn update<V: Simd>(simd: V, outside: V::i32s, z: V::f32s, id: V::u32s, depths: &mut [f32], ids: &mut [u32]) {
+    // No depth is negative, so their bits have their order. -1 outside.
+    let z = z.bitcast::<V::i32s>() | (outside >> 31);
+    let old_depths: V::i32s = V::f32s::from_slice(simd, depths).bitcast();
+    let old_ids = V::u32s::from_slice(simd, ids);
+    let is_tied = z.simd_eq(old_depths) & id.simd_le(old_ids);
+    z.max(old_depths).bitcast::<V::f32s>().store_slice(depths);
+    (z.simd_gt(old_depths) | is_tied).select(id, old_ids).store_slice(ids);
+}
+
+/// Offset of each lane's sample from the corner of the vector's first pixel, 1/16 px: across, down.
+/// The remainder modulo 16 that all samples share is in the corner already.
+#[inline(always)]
+fn offsets<V: Simd, const S: usize>(simd: V, part: usize) -> [V::i32s; 2] {
+    let lanes = V::i32s::LEN * part..V::i32s::LEN * (part + 1);
+    let [x, y] = &Offsets::<S>::ALL;
+    [V::i32s::from_slice(simd, &x[lanes.clone()]), V::i32s::from_slice(simd, &y[lanes])]
+}
+
+/// Those of as many samples as the widest vectors have.
+struct Offsets<const S: usize>;
+
+impl<const S: usize> Offsets<S> {
+    const ALL: [[i32; HANGOVER]; 2] = {
+        let offsets = sample_offsets(S as u32);
+        let mut all = [[0; HANGOVER]; 2];
+        let mut i = 0;
+        while i < HANGOVER {
+            let [x, y] = offsets[i % S];
+            (all[0][i], all[1][i]) = (16 * (i / S) as i32 + (x >> 4), y >> 4);
+            i += 1;
         }
-        for row in 0..=bottom - top {
-            let mut depth_y = [0.0; LANES];
-            for i in 0..LANES {
-                depth_y[i] = depth[2] * (from[1] + 256 * row + 16 * offset_y[i]) as f32;
-            }
-            let mut at = band.index(left, top + row, 0) + LANES * part;
-            for column in (0..=right - left).step_by(pixels) {
-                let (mut outside, mut z) = ([0; LANES], [0.0; LANES]);
-                for k in 0..3 {
-                    let base = 16 * (dx[k] * row - dy[k] * column);
-                    for i in 0..LANES {
-                        outside[i] |= base + steps[k][i];
-                    }
-                }
-                for i in 0..LANES {
-                    let across = depth[0] + depth[1] * (x[i] + 256 * column) as f32;
-                    z[i] = visibility::clamp(across + depth_y[i], depth_range);
-                }
-                if let Some((depths, ids)) = band.lanes_mut(at) {
-                    update(&outside, &z, id, depths, ids);
-                }
-                at += pixels * S;
-            }
-        }
-    }
+        all
+    };
 }

@@ -7,10 +7,6 @@
 //! both back-ends agree on every sample. Twins are in `shaders/geometry/`.
 
 pub(crate) mod batch;
-#[cfg(target_arch = "x86_64")]
-pub(crate) mod batch_avx2;
-#[cfg(target_arch = "x86_64")]
-pub(crate) mod batch_avx512;
 pub(crate) mod clip;
 pub(crate) mod nearest;
 pub(crate) mod samples;

@@ -15,7 +15,7 @@ macro_rules! for_samples {
 }
 pub(crate) use for_samples;
 
-/// Samples beyond a row's last pixel, so that a vector may hang over.
+/// Samples beyond a row's last pixel, so that a vector may hang over: as many as the widest vector has.
 pub const HANGOVER: usize = 2 * LANES;
 
 /// No triangle.

@@ -3,8 +3,11 @@
 //! Values are those of [`visibility`](super::visibility). Edge functions of triangles up to
 //! [`EXTENT_MAX`] fit 32 bits, so no blocks are needed.
 
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, i32x4, i32x8, mask32x8};
+
 use super::samples::{SampleBand, SampleGrid};
-use super::transform::recip;
+use super::transform::ScreenVertex;
 use super::visibility::Parts;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::isa::LANES;
@@ -37,7 +40,6 @@ pub mod class {
 pub struct Corners {
     pub x: [[i32; LANES]; 3],
     pub y: [[i32; LANES]; 3],
-    pub z: [[f32; LANES]; 3],
 }
 
 /// Eight triangles, ready to be drawn. Long ones have their bounds and their depth range alone.
@@ -51,14 +53,88 @@ impl Corners {
     /// The corners of triangles by id.
     #[inline(always)]
     pub fn load(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Self {
-        let (mut x, mut y, mut z) = ([[0; LANES]; 3], [[0; LANES]; 3], [[0.0; LANES]; 3]);
+        let (mut x, mut y) = ([[0; LANES]; 3], [[0; LANES]; 3]);
         for l in 0..LANES {
             let corners = context.screen_triangle(ids[l]);
             for k in 0..3 {
-                (x[k][l], y[k][l], z[k][l]) = (corners[k].x, corners[k].y, corners[k].z);
+                (x[k][l], y[k][l]) = (corners[k].x, corners[k].y);
             }
         }
-        Self { x, y, z }
+        Self { x, y }
+    }
+}
+
+/// Corners of eight triangles, in vectors.
+pub struct CornerLanes<V: Simd> {
+    pub x: [i32x8<V>; 3],
+    pub y: [i32x8<V>; 3],
+    pub z: [f32x8<V>; 3],
+}
+
+impl<V: Simd> CornerLanes<V> {
+    /// The corners of triangles by the indices of their vertices.
+    #[inline(always)]
+    pub fn load(simd: V, vertices: &[ScreenVertex], triangles: &[[u32; 3]; LANES]) -> Self {
+        let ints = [i32x8::splat(simd, 0); 3];
+        let mut corners = Self { x: ints, y: ints, z: [f32x8::splat(simd, 0.0); 3] };
+        for k in 0..3 {
+            let mut rows = [[i32x4::splat(simd, 0); 4]; 2];
+            for l in 0..LANES {
+                let vertex = &vertices[triangles[l][k] as usize];
+                rows[l / 4][l % 4] = i32x4::simd_from(simd, *bytemuck::must_cast_ref::<_, [i32; 4]>(vertex));
+            }
+            let z;
+            [corners.x[k], corners.y[k], z, _] = transposed(rows);
+            corners.z[k] = z.bitcast();
+        }
+        corners
+    }
+
+    /// The nearest depths.
+    #[inline(always)]
+    pub fn depth_max(&self) -> f32x8<V> {
+        self.z[0].max(self.z[1]).max(self.z[2])
+    }
+}
+
+/// The columns of eight rows of four.
+#[inline(always)]
+pub fn transposed<V: Simd>([lower, upper]: [[i32x4<V>; 4]; 2]) -> [i32x8<V>; 4] {
+    let (lower, upper) = (transposed_half(lower), transposed_half(upper));
+    let mut columns = [lower[0].combine(upper[0]); 4];
+    for k in 1..4 {
+        columns[k] = lower[k].combine(upper[k]);
+    }
+    columns
+}
+
+/// The columns of four rows.
+#[inline(always)]
+pub fn transposed_half<V: Simd>([a, b, c, d]: [i32x4<V>; 4]) -> [i32x4<V>; 4] {
+    let ((ac_low, ac_high), (bd_low, bd_high)) = (a.interleave(c), b.interleave(d));
+    let ((x, y), (z, w)) = (ac_low.interleave(bd_low), ac_high.interleave(bd_high));
+    [x, y, z, w]
+}
+
+/// First and last pixel along an axis of triangles' coordinates from the picture's centre, which is `half` from its corner.
+pub struct Extents<V: Simd> {
+    pub first: i32x8<V>,
+    pub last: i32x8<V>,
+    /// True up to [`EXTENT_MAX`].
+    pub is_small: mask32x8<V>,
+}
+
+impl<V: Simd> Extents<V> {
+    /// As `pixels` of the grid.
+    #[inline(always)]
+    pub fn new(simd: V, grid: SampleGrid, v: &[i32x8<V>; 3], half: i32, [from, to]: [i32; 2]) -> Self {
+        let (low, high) = (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
+        let (cells, pixels) = ((8 - grid.shift) as u32, grid.shift as u32);
+        let first = (low + (half + grid.border - 1)) >> cells;
+        let last = (high + (half - grid.border)) >> cells;
+        let is_empty = first.simd_gt(last);
+        let last = is_empty.select(i32x8::splat(simd, i32::MIN), last >> pixels);
+        Self { first: (first >> pixels).max(from), last: last.min(to - 1), is_small: (high - low).simd_le(EXTENT_MAX) }
     }
 }
 
@@ -71,21 +147,34 @@ pub struct Boxes {
 
 impl Boxes {
     #[inline(always)]
-    pub fn new<const S: usize>(corners: &Corners, band: &SampleBand) -> Self {
-        let grid = SampleGrid::new(S as u32);
-        let (half, ranges) = (band.size_px.map(|size| size as i32 * 128), band.range());
-        let mut boxes = Self { bounds: [[[0; LANES]; 2]; 2], depth_max: [0.0; LANES] };
-        for l in 0..LANES {
-            for (k, v) in [lane(&corners.x, l), lane(&corners.y, l)].into_iter().enumerate() {
-                let (low, high) = (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
-                [boxes.bounds[k][0][l], boxes.bounds[k][1][l]] =
-                    grid.pixels([low + half[k], high + half[k]], ranges[k]);
-            }
-            let z = lane(&corners.z, l);
-            boxes.depth_max[l] = z[0].max(z[1]).max(z[2]);
-        }
-        boxes
+    pub fn new<V: Simd, const S: usize>(
+        simd: V,
+        context: &RasterContext<'_>,
+        ids: &[u32; LANES],
+        band: &SampleBand,
+    ) -> Self {
+        let corners = CornerLanes::load(simd, context.vertices, &context.indices_of(ids));
+        let [columns, rows] = extents::<V, S>(simd, &corners, band);
+        Self { bounds: bounds(&columns, &rows), depth_max: corners.depth_max().into() }
     }
+}
+
+/// Of columns, and of rows.
+#[inline(always)]
+fn extents<V: Simd, const S: usize>(simd: V, corners: &CornerLanes<V>, band: &SampleBand) -> [Extents<V>; 2] {
+    let (grid, [columns, rows]) = (SampleGrid::new(S as u32), band.range());
+    let [half_x, half_y] = half(band);
+    [Extents::new(simd, grid, &corners.x, half_x, columns), Extents::new(simd, grid, &corners.y, half_y, rows)]
+}
+
+#[inline(always)]
+fn half(band: &SampleBand) -> [i32; 2] {
+    [band.size_px[0] as i32 * 128, band.size_px[1] as i32 * 128]
+}
+
+#[inline(always)]
+fn bounds<V: Simd>(columns: &Extents<V>, rows: &Extents<V>) -> [[[i32; LANES]; 2]; 2] {
+    [[columns.first.into(), columns.last.into()], [rows.first.into(), rows.last.into()]]
 }
 
 impl Setups {
@@ -93,93 +182,82 @@ impl Setups {
     pub const EMPTY: Self = Self { parts: Parts::EMPTY, classes: [class::EMPTY; LANES] };
 
     #[inline(always)]
-    pub fn new<const S: usize>(corners: &Corners, band: &SampleBand) -> Self {
-        let mut s = Self::EMPTY;
-        let Boxes { bounds, depth_max } = Boxes::new::<S>(corners, band);
-        let half = band.size_px.map(|size| size as i32 * 128);
-        let shift = sample_offsets(S as u32)[0][0] & 15;
-        for l in 0..LANES {
-            let (x, y, z) = (lane(&corners.x, l), lane(&corners.y, l), lane(&corners.z, l));
-            let extent = |v: [i32; 3]| v[0].max(v[1]).max(v[2]) - v[0].min(v[1]).min(v[2]);
-            let [[left, right], [top, bottom]] =
-                [[bounds[0][0][l], bounds[0][1][l]], [bounds[1][0][l], bounds[1][1][l]]];
-            let (columns, rows) = (right.wrapping_sub(left), bottom.wrapping_sub(top));
-            let depth_min = z[0].min(z[1]).min(z[2]);
-            let is_short = (extent(x) <= EXTENT_MAX)
-                & (extent(y) <= EXTENT_MAX)
-                & (columns < SHORT_MAX)
-                & (rows < SHORT_MAX)
-                & (depth_min > 0.0);
-            let vectors = columns / (LANES / S).max(1) as i32;
-            s.classes[l] = if (left > right) | (top > bottom) {
-                class::EMPTY
-            } else if !is_short {
-                class::LONG
-            } else if (rows < SIZES) & (vectors < SIZES) {
-                rows * SIZES + vectors
-            } else {
-                class::SHORT
-            };
-            s.parts.depth_range[0][l] = depth_min;
-            // These values may wrap around in lanes that are not short, where nothing reads them.
-            let corner = [
-                left.wrapping_mul(256).wrapping_sub(half[0]).wrapping_add(shift),
-                top.wrapping_mul(256).wrapping_sub(half[1]).wrapping_add(shift),
-            ];
-            s.parts.set_lane(l, x, y, z, corner);
-        }
-        s.parts.bounds = bounds;
-        s.parts.depth_range[1] = depth_max;
-        s
+    pub fn set<V: Simd, const S: usize>(
+        &mut self,
+        simd: V,
+        context: &RasterContext<'_>,
+        ids: &[u32; LANES],
+        band: &SampleBand,
+    ) {
+        let corners = CornerLanes::load(simd, context.vertices, &context.indices_of(ids));
+        let [columns, rows] = extents::<V, S>(simd, &corners, band);
+        let depth_min = corners.z[0].min(corners.z[1]).min(corners.z[2]);
+        self.classes = classes::<V, S>(simd, &columns, &rows, depth_min.simd_gt(0.0)).into();
+        self.parts.bounds = bounds(&columns, &rows);
+        self.parts.depth_range = [depth_min.into(), corners.depth_max().into()];
+        let (shift, half) = (sample_offsets(S as u32)[0][0] & 15, half(band));
+        // These values may wrap around in lanes that are not short, where nothing reads them.
+        self.parts.set(corners, [(columns.first << 8) + (shift - half[0]), (rows.first << 8) + (shift - half[1])]);
     }
+}
+
+#[inline(always)]
+fn classes<V: Simd, const S: usize>(
+    simd: V,
+    columns: &Extents<V>,
+    rows: &Extents<V>,
+    is_deep: mask32x8<V>,
+) -> i32x8<V> {
+    let is_empty = columns.first.simd_gt(columns.last) | rows.first.simd_gt(rows.last);
+    let (width, height) = (columns.last - columns.first, rows.last - rows.first);
+    let is_short =
+        (columns.is_small & rows.is_small & is_deep) & (width.simd_lt(SHORT_MAX) & height.simd_lt(SHORT_MAX));
+    let vectors = width >> (LANES / S).max(1).trailing_zeros();
+    let is_small = height.simd_lt(SIZES) & vectors.simd_lt(SIZES);
+    let short = is_small.select(height * SIZES + vectors, i32x8::splat(simd, class::SHORT));
+    let any = is_short.select(short, i32x8::splat(simd, class::LONG));
+    is_empty.select(i32x8::splat(simd, class::EMPTY), any)
 }
 
 impl Parts<LANES> {
     /// Edges and depth, as `Setup`, `Edges::new` and `Edges::at` of `visibility` have them.
     #[inline(always)]
-    fn set_lane(&mut self, l: usize, x: [i32; 3], y: [i32; 3], z: [f32; 3], corner: [i32; 2]) {
-        let cross = |ax: i32, ay: i32, bx: i32, by: i32| ax.wrapping_mul(by).wrapping_sub(bx.wrapping_mul(ay));
-        let area = cross(x[1] - x[0], y[1] - y[0], x[2] - x[0], y[2] - y[0]);
-        let flip = area < 0;
-        let swap = |v: [i32; 3]| if flip { [v[0], v[2], v[1]] } else { v };
-        let (x, y) = (swap(x), swap(y));
-        let z = if flip { [z[0], z[2], z[1]] } else { z };
-        let (dx1, dy1) = ((x[1] - x[0]) as f32, (y[1] - y[0]) as f32);
-        let (dx2, dy2) = ((x[2] - x[0]) as f32, (y[2] - y[0]) as f32);
+    fn set<V: Simd>(&mut self, CornerLanes { x, y, z }: CornerLanes<V>, corner: [i32x8<V>; 2]) {
+        let area = cross([x[1] - x[0], y[1] - y[0]], [x[2] - x[0], y[2] - y[0]]);
+        let flip = area.simd_lt(0);
+        let x = [x[0], flip.select(x[2], x[1]), flip.select(x[1], x[2])];
+        let y = [y[0], flip.select(y[2], y[1]), flip.select(y[1], y[2])];
+        let z = [z[0], flip.select(z[2], z[1]), flip.select(z[1], z[2])];
+        let (dx1, dx2) = (f32x8::float_from(x[1] - x[0]), f32x8::float_from(x[2] - x[0]));
+        let (dy1, dy2) = (f32x8::float_from(y[1] - y[0]), f32x8::float_from(y[2] - y[0]));
         let (dz1, dz2) = (z[1] - z[0], z[2] - z[0]);
-        let inverse = recip(area.wrapping_abs() as f32);
-        self.depth[0][l] = z[0];
-        self.depth[1][l] = (dz1 * dy2 - dz2 * dy1) * inverse;
-        self.depth[2][l] = (dz2 * dx1 - dz1 * dx2) * inverse;
+        let inverse = recip(f32x8::float_from(area.abs()));
+        self.depth[0] = z[0].into();
+        self.depth[1] = ((dz1 * dy2 - dz2 * dy1) * inverse).into();
+        self.depth[2] = ((dz2 * dx1 - dz1 * dx2) * inverse).into();
         for k in 0..3 {
             let (dx, dy) = (x[(k + 1) % 3] - x[k], y[(k + 1) % 3] - y[k]);
-            let bias = if (dy < 0) | ((dy == 0) & (dx > 0)) { 0 } else { -1 };
-            let at = cross(dx, dy, corner[0].wrapping_sub(x[k]), corner[1].wrapping_sub(y[k]));
-            self.edges[k][l] = at.wrapping_add(bias) >> 4;
-            self.dx[k][l] = dx;
-            self.dy[k][l] = dy;
+            let is_owner = dy.simd_lt(0) | (dy.simd_eq(0) & dx.simd_gt(0));
+            let at = cross([dx, dy], [corner[0] - x[k], corner[1] - y[k]]);
+            self.edges[k] = (is_owner.select(at, at - 1) >> 4).into();
+            self.dx[k] = dx.into();
+            self.dy[k] = dy.into();
         }
-        self.from[0][l] = corner[0].wrapping_sub(x[0]);
-        self.from[1][l] = corner[1].wrapping_sub(y[0]);
+        self.from = [(corner[0] - x[0]).into(), (corner[1] - y[0]).into()];
     }
 }
 
-/// A lane of three vectors. Not `map`, which may stay a call.
 #[inline(always)]
-fn lane<T: Copy>(v: &[[T; LANES]; 3], l: usize) -> [T; 3] {
-    [v[0][l], v[1][l], v[2][l]]
+fn cross<V: Simd>(a: [i32x8<V>; 2], b: [i32x8<V>; 2]) -> i32x8<V> {
+    a[0] * b[1] - b[0] * a[1]
 }
 
-/// Offset of each lane's sample from the corner of the vector's first pixel, 1/16 px: across, down.
-/// The remainder modulo 16 that all samples share is in the corner already.
+/// As [`recip`](super::transform::recip).
 #[inline(always)]
-pub fn lane_offsets<const S: usize>(part: usize) -> [[i32; LANES]; 2] {
-    let offsets = sample_offsets(S as u32);
-    let (mut x, mut y) = ([0; LANES], [0; LANES]);
-    for i in 0..LANES {
-        let at = offsets[(LANES * part + i) % S];
-        x[i] = 16 * (i / S) as i32 + (at[0] >> 4);
-        y[i] = at[1] >> 4;
+fn recip<V: Simd>(w: f32x8<V>) -> f32x8<V> {
+    let mut r: f32x8<V> = (0x7EF3_11C7 - w.bitcast::<i32x8<V>>()).bitcast();
+    for _ in 0..4 {
+        r += r * (1.0 - w * r);
     }
-    [x, y]
+    r
 }

@@ -12,7 +12,7 @@ pub const GUARD: f32 = 1_048_576.0;
 
 /// A vertex on screen.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct ScreenVertex {
     /// 1/256 px right of the picture's centre, or [`OUTSIDE`].
     pub x: i32,

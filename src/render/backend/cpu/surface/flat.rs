@@ -3,12 +3,13 @@
 
 use rayon::prelude::*;
 
+use super::flat_lanes;
 use super::point::{Show, flat_colors, is_flat};
 use super::shade::Shader;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
-use crate::backend::cpu::isa::{Isa, LANES, dispatch};
+use crate::backend::cpu::isa::{Isa, LANES, dispatch, with_simd};
 use crate::backend::cpu::resolve::Resolver;
 use crate::backend::cpu::vector::turned_to_viewer;
 use crate::plan::{DrawPlan, SurfacePass, flags};
@@ -165,16 +166,13 @@ impl Group {
 
     /// Normals on the viewer's side.
     #[inline(always)]
-    #[allow(unsafe_code)]
     fn normals(&self, isa: Isa, surface: &SurfacePass<'_>, is_front: bool) -> [[f32; LANES]; 3] {
-        #[cfg(target_arch = "x86_64")]
-        if isa.has_avx2() && self.len == LANES {
-            // SAFETY: the processor has AVX2, as `isa` says.
-            if let Some(normals) = unsafe { super::flat_avx2::normals(&surface.face_normals, &self.ids, is_front) } {
+        if self.len == LANES {
+            let all = &surface.face_normals;
+            if let Some(normals) = with_simd!(isa, simd => flat_lanes::normals(simd, all, &self.ids, is_front)) {
                 return normals;
             }
         }
-        let _ = isa;
         let mut normals = [[0.0; LANES]; 3];
         for l in 0..self.len {
             let normal = turned_to_viewer(surface.face_normals[self.ids[l] as usize], is_front);
@@ -185,17 +183,10 @@ impl Group {
         normals
     }
 
-    /// Writes eight colours at once, where this processor can. True if it did, and all are finite.
+    /// Writes eight colours at once. True if there are as many, and all are finite.
     #[inline(always)]
-    #[allow(unsafe_code)]
     fn are_written(&self, isa: Isa, colors: &[[f32; LANES]; 4], (first, out): (usize, &mut [[f32; 4]])) -> bool {
-        #[cfg(target_arch = "x86_64")]
-        if isa.has_avx2() && self.len == LANES {
-            // SAFETY: the processor has AVX2, as `isa` says.
-            return unsafe { super::flat_avx2::write(colors, &self.ids, first as u32, out) };
-        }
-        let _ = (isa, colors, first, out);
-        false
+        self.len == LANES && with_simd!(isa, simd => flat_lanes::write(simd, colors, &self.ids, first as u32, out))
     }
 }
 
@@ -322,25 +313,19 @@ fn pixel_by_point<const S: usize>(context: &RasterContext<'_>, band: &SampleBand
     Shader::new(context).pixel::<S>(band, x, y)
 }
 
-/// Fills a group's pixels with the means of their samples at once, where this processor can. True
-/// if it did, and knew all colours.
+/// Fills a group's pixels with the means of their samples at once, where they have several. True if it did, and knew all
+/// colours.
 #[inline(always)]
-#[allow(unsafe_code)]
 fn are_means_known<const S: usize>(isa: Isa, flat: &FlatColors, pixels: &[[u32; S]], out: &mut [[f32; 4]]) -> bool {
-    #[cfg(target_arch = "x86_64")]
-    if isa.has_avx2() && S == 4 {
+    if S == 4 {
         let (ids, _) = pixels.as_flattened().as_chunks();
         if let (Some(ids), Some(out)) = (ids.first_chunk(), out.first_chunk_mut()) {
-            // SAFETY: the processor has AVX2, as `isa` says.
-            return unsafe { super::flat_avx2::means(&flat.colors, ids, out) };
+            return with_simd!(isa, simd => flat_lanes::means(simd, &flat.colors, ids, out));
         }
     }
-    #[cfg(target_arch = "x86_64")]
-    if isa.has_avx2() && S.is_multiple_of(LANES) {
-        // SAFETY: the processor has AVX2, as `isa` says.
-        return unsafe { super::flat_avx2::means_of_many(&flat.colors, pixels, out) };
+    if S.is_multiple_of(LANES) {
+        return with_simd!(isa, simd => flat_lanes::means_of_many(simd, &flat.colors, pixels, out));
     }
-    let _ = (isa, flat, pixels, out);
     false
 }
 
@@ -406,7 +391,7 @@ mod tests {
             let are_known = are_means_known(isa, &flat, &pixels, &mut found);
             let has_unknown = pixels.as_flattened().contains(&7);
             assert!(!(are_known && has_unknown));
-            assert!(isa == Isa::baseline() || S == 1 || are_known != has_unknown, "{S} samples");
+            assert!(S == 1 || are_known != has_unknown, "{S} samples");
             for (ids, (want, found)) in pixels.iter().zip(want.iter().zip(&found)) {
                 let bits = |color: &[f32; 4]| color.map(f32::to_bits);
                 assert_eq!(mean(&flat, ids)[3].is_nan(), ids.contains(&7));
@@ -424,8 +409,7 @@ mod tests {
     fn every_instruction_set_has_the_same_means() {
         for isa in Isa::available() {
             let known = [means_of::<1>(isa), means_of::<4>(isa), means_of::<8>(isa), means_of::<16>(isa)];
-            let at_once = |known: usize| (known > 300) == (isa != Isa::baseline());
-            assert!(known[1..].iter().all(|known| at_once(*known)), "{known:?}");
+            assert!(known[1..].iter().all(|known| *known > 300), "{known:?}");
         }
     }
 }

@@ -8,8 +8,7 @@
 pub(crate) mod barycentric;
 pub(crate) mod debug;
 pub(crate) mod flat;
-#[cfg(target_arch = "x86_64")]
-mod flat_avx2;
+mod flat_lanes;
 pub(crate) mod light;
 pub(crate) mod normal;
 mod occlusion_texture;

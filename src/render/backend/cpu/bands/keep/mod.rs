@@ -1,19 +1,17 @@
 //! Culling of triangles, before they are sorted into bands: what faces away, and what no sample can
 //! show.
 
-#[cfg(target_arch = "x86_64")]
-mod avx2;
+mod lanes;
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::backend::cpu::RasterContext;
-use crate::backend::cpu::bands::lists::{BoxedFace, KeptFaces, pair};
+use crate::backend::cpu::bands::lists::KeptFaces;
 use crate::backend::cpu::geometry::samples::SampleGrid;
-use crate::backend::cpu::geometry::setups::Corners;
-use crate::backend::cpu::geometry::transform::{OUTSIDE, ScreenVertex};
-use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::geometry::transform::ScreenVertex;
+use crate::backend::cpu::isa::{LANES, with_simd};
 use crate::backend::cpu::mixed::points::POINT_GRID;
-use crate::backend::cpu::mixed::thinness::is_thin;
 use crate::plan::{DrawPlan, Faces, pass_mask};
 
 /// Triangles of one pass.
@@ -162,90 +160,10 @@ impl Kept {
 }
 
 /// Culls the triangles of a pass.
-#[allow(unsafe_code)]
 pub fn keep(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass) -> Kept {
-    #[cfg(target_arch = "x86_64")]
-    if let (true, Some(triangles)) = (context.isa.has_avx2(), context.triangles_of(&pass.ids)) {
-        // SAFETY: the processor has AVX2, as `isa` says.
-        return unsafe { avx2::keep(context, bounds, pass, triangles) };
-    }
-    keep_plainly(context, bounds, pass)
-}
-
-fn keep_plainly(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass) -> Kept {
-    let mut kept = Kept::with_room_for(pass.ids.len(), bounds);
-    for first in pass.ids.clone().step_by(LANES) {
-        let len = (pass.ids.end - first).min(LANES);
-        let mut ids = [first as u32; LANES];
-        for l in 0..len {
-            ids[l] += l as u32;
-        }
-        let corners = Corners::load(context, &ids);
-        let drawn = pass.drawn(context.plan, first, len);
-        let mut sides = Sides::default();
-        for l in 0..len {
-            let lane = Lane::new(&corners, l, bounds);
-            sides.front |= u8::from(!lane.is_outside && lane.area < 0) << l;
-            sides.back |= u8::from(!lane.is_outside && lane.area > 0) << l;
-            let is_drawn = |k: usize| drawn[k] >> l & 1 != 0;
-            if lane.is_outside && (is_drawn(0) || is_drawn(1)) {
-                kept.outside.push(ids[l]);
-            }
-            if lane.is_seen && lane.area < 0 && is_drawn(0) {
-                kept.fronts.ids.push(ids[l]);
-                kept.fronts.spans.push(lane.span);
-                if bounds.has_mixed {
-                    kept.fronts.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
-                }
-            }
-            if lane.is_seen && lane.area > 0 && is_drawn(1) {
-                kept.backs.ids.push(ids[l]);
-                kept.backs.spans.push(lane.span);
-                kept.backs.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
-            }
-            let is_shown = lane.area < 0 && is_drawn(0) || lane.area > 0 && is_drawn(1);
-            if lane.is_seen && is_shown && lane.is_thin {
-                kept.thin.ids.push(ids[l]);
-                kept.thin.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
-                kept.thin.spans.push(lane.span);
-            }
-        }
-        kept.sides.push(sides);
-    }
-    kept
-}
-
-/// A triangle on screen.
-struct Lane {
-    is_outside: bool,
-    is_seen: bool,
-    is_thin: bool,
-    area: i64,
-    /// As [`KeptFaces`] has it.
-    span: u32,
-    boxed: BoxedFace,
-}
-
-impl Lane {
-    #[inline(always)]
-    fn new(corners: &Corners, l: usize, bounds: &Bounds) -> Self {
-        let of = |v: &[[i32; LANES]; 3]| [v[0][l], v[1][l], v[2][l]];
-        let (x, y) = (of(&corners.x), of(&corners.y));
-        let z = [corners.z[0][l], corners.z[1][l], corners.z[2][l]];
-        let is_outside = (x[0] == OUTSIDE) | (x[1] == OUTSIDE) | (x[2] == OUTSIDE);
-        let [columns, rows] = bounds.pixels_of([x, y]);
-        let [top, bottom] = bounds.with_margin(rows);
-        let is_seen = (columns[0] <= columns[1]) & (top <= bottom) & !is_outside;
-        let area = area_of(x, y);
-        Self {
-            is_outside,
-            is_seen,
-            is_thin: bounds.has_mixed && is_thin(x, y, area),
-            area,
-            span: if is_seen { pair([top / bounds.rows, bottom / bounds.rows]) } else { 0 },
-            boxed: BoxedFace { id: 0, columns: pair(columns), rows: pair(rows), depth_max: z[0].max(z[1]).max(z[2]) },
-        }
-    }
+    let one_by_one = || Cow::Owned(pass.ids.clone().map(|id| context.triangle(id as u32)).collect());
+    let triangles = context.triangles_of(&pass.ids).map_or_else(one_by_one, Cow::Borrowed);
+    with_simd!(context.isa, simd => lanes::keep(simd, context, bounds, pass, &triangles))
 }
 
 /// Twice the signed area. Only what lies outside wraps, and its area is not looked at.
@@ -258,10 +176,91 @@ pub fn area_of(x: [i32; 3], y: [i32; 3]) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::backend::cpu::bands::lists::{BoxedFace, pair};
+    use crate::backend::cpu::geometry::setups::Corners;
+    use crate::backend::cpu::geometry::transform::OUTSIDE;
+    use crate::backend::cpu::mixed::thinness::is_thin;
     use crate::backend::cpu::stopwatch::Stopwatch;
     use crate::backend::cpu::{CpuRenderer, Isa};
     use crate::limits::Deadline;
     use crate::plan::{HullPass, Projection};
+
+    /// As `keep`, triangle by triangle.
+    fn keep_plainly(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass) -> Kept {
+        let mut kept = Kept::with_room_for(pass.ids.len(), bounds);
+        for first in pass.ids.clone().step_by(LANES) {
+            let len = (pass.ids.end - first).min(LANES);
+            let mut ids = [first as u32; LANES];
+            for l in 0..len {
+                ids[l] += l as u32;
+            }
+            let corners = Corners::load(context, &ids);
+            let drawn = pass.drawn(context.plan, first, len);
+            let mut sides = Sides::default();
+            for l in 0..len {
+                let depth_max =
+                    context.screen_triangle(ids[l]).iter().fold(f32::NEG_INFINITY, |max, vertex| max.max(vertex.z));
+                let lane = Lane::new(&corners, l, bounds, depth_max);
+                sides.front |= u8::from(!lane.is_outside && lane.area < 0) << l;
+                sides.back |= u8::from(!lane.is_outside && lane.area > 0) << l;
+                let is_drawn = |k: usize| drawn[k] >> l & 1 != 0;
+                if lane.is_outside && (is_drawn(0) || is_drawn(1)) {
+                    kept.outside.push(ids[l]);
+                }
+                if lane.is_seen && lane.area < 0 && is_drawn(0) {
+                    kept.fronts.ids.push(ids[l]);
+                    kept.fronts.spans.push(lane.span);
+                    if bounds.has_mixed {
+                        kept.fronts.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
+                    }
+                }
+                if lane.is_seen && lane.area > 0 && is_drawn(1) {
+                    kept.backs.ids.push(ids[l]);
+                    kept.backs.spans.push(lane.span);
+                    kept.backs.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
+                }
+                let is_shown = lane.area < 0 && is_drawn(0) || lane.area > 0 && is_drawn(1);
+                if lane.is_seen && is_shown && lane.is_thin {
+                    kept.thin.ids.push(ids[l]);
+                    kept.thin.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
+                    kept.thin.spans.push(lane.span);
+                }
+            }
+            kept.sides.push(sides);
+        }
+        kept
+    }
+
+    /// A triangle on screen.
+    struct Lane {
+        is_outside: bool,
+        is_seen: bool,
+        is_thin: bool,
+        area: i64,
+        /// As [`KeptFaces`] has it.
+        span: u32,
+        boxed: BoxedFace,
+    }
+
+    impl Lane {
+        fn new(corners: &Corners, l: usize, bounds: &Bounds, depth_max: f32) -> Self {
+            let of = |v: &[[i32; LANES]; 3]| [v[0][l], v[1][l], v[2][l]];
+            let (x, y) = (of(&corners.x), of(&corners.y));
+            let is_outside = (x[0] == OUTSIDE) | (x[1] == OUTSIDE) | (x[2] == OUTSIDE);
+            let [columns, rows] = bounds.pixels_of([x, y]);
+            let [top, bottom] = bounds.with_margin(rows);
+            let is_seen = (columns[0] <= columns[1]) & (top <= bottom) & !is_outside;
+            let area = area_of(x, y);
+            Self {
+                is_outside,
+                is_seen,
+                is_thin: bounds.has_mixed && is_thin(x, y, area),
+                area,
+                span: if is_seen { pair([top / bounds.rows, bottom / bounds.rows]) } else { 0 },
+                boxed: BoxedFace { id: 0, columns: pair(columns), rows: pair(rows), depth_max },
+            }
+        }
+    }
 
     /// Triangles of all sizes, some of them behind the eye or far outside; those with a mask are
     /// drawn from one side, or not.
@@ -286,7 +285,7 @@ mod tests {
         let pass =
             TrianglePass { ids: 3..triangles.len(), pass_bit: pass_mask::SURFACE, faces: Faces::Both, has_mixed: true };
         let bounds = Bounds::new(&plan, [17, margin], true);
-        let lists = |isa: Isa| {
+        let lists = |isa: Isa, keep: fn(&RasterContext<'_>, &Bounds, &TrianglePass) -> Kept| {
             let mut cpu = CpuRenderer::with_isa(1, isa);
             cpu.transform(&plan, None);
             let kept = keep(&cpu.context(&plan, &deadline, &Stopwatch::default()), &bounds, &pass);
@@ -294,9 +293,11 @@ mod tests {
                 [kept.fronts, kept.backs, kept.thin].map(|kept| (kept.ids, kept.spans, kept.boxed));
             (fronts, backs, kept.outside, kept.sides, thin)
         };
-        let all: Vec<_> = Isa::available().into_iter().map(lists).collect();
-        assert!(all.iter().all(|found| *found == all[0]), "{samples} samples, margin {margin}");
-        let (fronts, backs, outside, _, thin) = &all[0];
+        let want = lists(Isa::baseline(), keep_plainly);
+        for isa in Isa::available() {
+            assert!(lists(isa, keep) == want, "{samples} samples, margin {margin}, {isa:?}");
+        }
+        let (fronts, backs, outside, _, thin) = &want;
         assert!(thin.0.len() > 10, "{}", thin.0.len());
         [fronts.0.len(), backs.0.len(), outside.len()]
     }

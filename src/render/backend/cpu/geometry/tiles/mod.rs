@@ -1,18 +1,19 @@
 //! Stage visibility: the farthest depth in each tile of a band. A triangle behind that depth is hidden
 //! in the whole tile.
 
-#[cfg(target_arch = "x86_64")]
-mod avx2;
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, i32x4, i32x8, u32x8};
 
 use super::samples::SampleBand;
+use super::setups::transposed;
 use crate::backend::cpu::bands::lists::{BoxedFace, unpair};
-use crate::backend::cpu::isa::{Isa, LANES};
+use crate::backend::cpu::isa::{Isa, LANES, with_simd};
 
 /// Pixels along a tile's side.
 const TILE: usize = 1 << TILE_SHIFT;
 
 /// Its binary logarithm.
-const TILE_SHIFT: i32 = 3;
+const TILE_SHIFT: u32 = 3;
 
 /// The smallest depth (reversed: the farthest) of each tile of 8 x 8 pixels.
 #[derive(Default)]
@@ -62,17 +63,55 @@ impl Tiles {
 
     /// Bits of up to eight faces that the tiles do not hide, in these rows of samples.
     #[inline(always)]
-    #[allow(unsafe_code)]
     pub fn seen(&self, isa: Isa, faces: &[BoxedFace], rows: [i32; 2]) -> u32 {
-        #[cfg(target_arch = "x86_64")]
-        if isa.has_avx2() {
-            // SAFETY: the processor has AVX2, as `isa` says.
-            if let Some(seen) = unsafe { avx2::seen(self, faces, rows) } {
-                return seen;
-            }
+        let at_once =
+            faces.first_chunk().and_then(|faces| with_simd!(isa, simd => self.seen_at_once(simd, faces, rows)));
+        match at_once {
+            Some(seen) => seen,
+            None => self.seen_one_by_one(faces, rows),
         }
-        let _ = isa;
-        self.seen_one_by_one(faces, rows)
+    }
+
+    /// None if one of the faces touches more than two tiles along an axis.
+    #[inline(always)]
+    fn seen_at_once<V: Simd>(&self, simd: V, faces: &[BoxedFace; LANES], [from, to]: [i32; 2]) -> Option<u32> {
+        let mut of_faces = [[i32x4::splat(simd, 0); 4]; 2];
+        for l in 0..LANES {
+            of_faces[l / 4][l % 4] = i32x4::simd_from(simd, *bytemuck::must_cast_ref::<_, [i32; 4]>(&faces[l]));
+        }
+        let [_, columns, rows, depth_max] = transposed(of_faces);
+        let (top, bottom) = (((rows << 16) >> 16).max(from), (rows >> 16).min(to - 1));
+        let is_empty = top.simd_gt(bottom);
+        let (left, right) = (self.tile_of((columns << 16) >> 16, 0), self.tile_of(columns >> 16, 0));
+        let (top, bottom) = (self.tile_of(top, 1), self.tile_of(bottom, 1));
+        let is_large = (right - left).simd_gt(1) | (bottom - top).simd_gt(1);
+        if (is_large & !is_empty).any_true() {
+            return None;
+        }
+        let (top, bottom) = (top * self.columns as i32, bottom * self.columns as i32);
+        let upper = self.depths_of(top + left)?.min(self.depths_of(top + right)?);
+        let lower = self.depths_of(bottom + left)?.min(self.depths_of(bottom + right)?);
+        let is_hidden = depth_max.bitcast::<f32x8<V>>().simd_lt(upper.min(lower));
+        Some((!(is_empty | is_hidden)).to_bitmask() as u32)
+    }
+
+    /// The tiles in which columns (0) or rows (1) of pixels lie.
+    #[inline(always)]
+    fn tile_of<V: Simd>(&self, v: i32x8<V>, axis: usize) -> i32x8<V> {
+        ((v - self.first[axis]).bitcast::<u32x8<V>>() >> TILE_SHIFT).bitcast()
+    }
+
+    /// The farthest depths in eight tiles; of those beyond the last, its depth.
+    #[inline(always)]
+    fn depths_of<V: Simd>(&self, tiles: i32x8<V>) -> Option<f32x8<V>> {
+        let last = self.depth_min.len().checked_sub(1)? as u32;
+        let simd = tiles.token();
+        let tiles: [u32; LANES] = tiles.bitcast::<u32x8<V>>().min(last).into();
+        let mut depths = [0.0; LANES];
+        for l in 0..LANES {
+            depths[l] = self.depth_min[tiles[l] as usize];
+        }
+        Some(f32x8::simd_from(simd, depths))
     }
 
     #[inline(never)]

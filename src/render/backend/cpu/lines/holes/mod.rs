@@ -27,6 +27,8 @@
 //! disc that shows the face and is as wide as the line, and `LinePass::holes_width_px` admits only
 //! lines so wide that such a disc contains a sample.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
 pub(crate) mod dig;
 pub(crate) mod free_points;
 pub(crate) mod inset;

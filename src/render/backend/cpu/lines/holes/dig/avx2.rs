@@ -1,12 +1,12 @@
 //! The inner loops of [`dig`](super) in AVX2 instructions. The results are the same as without.
 
-#![allow(unsafe_code)]
-
 use std::arch::x86_64::*;
 
+use bytemuck::must_cast;
+
 use super::Samples;
-use crate::backend::cpu::geometry::batch_avx2::{bits, from_floats, from_words};
 use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::lines::holes::avx2::bits;
 use crate::backend::cpu::lines::holes::inset::{INSIDE, Inset};
 
 /// As `shown_plainly`, of at most ten pixels.
@@ -16,7 +16,7 @@ pub fn shown<const S: usize>(ids: &[u32], id: u32) -> u32 {
     let (groups, rest) = ids.as_chunks::<LANES>();
     let mut shown = 0_u64;
     for (i, group) in groups.iter().enumerate() {
-        let equal = u64::from(bits(_mm256_cmpeq_epi32(from_words(group), lanes)));
+        let equal = u64::from(bits(_mm256_cmpeq_epi32(must_cast(*group), lanes)));
         shown |= match S {
             1 | 4 => equal << (LANES * i),
             _ => u64::from(equal != 0) << (i * LANES / S),
@@ -47,9 +47,9 @@ pub fn hides<'s>(inset: &Inset, id: u32, corner: [f32; 2], samples: impl Iterato
     let (left, top) = (_mm256_set1_ps(corner[0]), _mm256_set1_ps(corner[1]));
     let mut hides = _mm256_setzero_ps();
     for (right, down, ids) in samples {
-        let x = _mm256_add_ps(left, from_floats(right));
-        let y = _mm256_add_ps(top, from_floats(down));
-        let is_own = _mm256_cmpeq_epi32(from_words(ids), _mm256_set1_epi32(id as i32));
+        let x = _mm256_add_ps(left, must_cast(*right));
+        let y = _mm256_add_ps(top, must_cast(*down));
+        let is_own = _mm256_cmpeq_epi32(must_cast(*ids), _mm256_set1_epi32(id as i32));
         let mut is_outside = _mm256_castsi256_ps(is_own);
         for (corner, unit) in &sides {
             let across = _mm256_mul_ps(_mm256_set1_ps(unit[0]), _mm256_sub_ps(y, _mm256_set1_ps(corner[1])));

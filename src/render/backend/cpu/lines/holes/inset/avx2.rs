@@ -3,20 +3,19 @@
 //! Written by hand because the compiler does not vectorize two steps of the plain code: the
 //! conversion of f32 to integers, and minima and maxima that treat NaN as Rust does.
 
-#![allow(unsafe_code)]
-
 use std::arch::x86_64::*;
+
+use bytemuck::must_cast;
 
 use super::{HOLE_UNIT, Inset, Insets, LEVEL_PX, NARROW_PX};
 use crate::backend::cpu::RasterContext;
-use crate::backend::cpu::geometry::batch_avx2::{from_floats, load_corners, recip, to_floats, to_ints, to_words};
 use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::lines::holes::avx2::{load_corners, recip};
 
 /// As [`Insets::new`], of faces by id.
 #[target_feature(enable = "avx2")]
 pub fn insets(context: &RasterContext<'_>, ids: &[u32; LANES], half: [i32; 2], half_width: f32) -> Insets {
-    let faces = load_corners(context, ids);
-    let corners = [faces.x, faces.y];
+    let corners = load_corners(context, ids);
     let zero = _mm256_setzero_ps();
     let one = _mm256_set1_ps(1.0);
     let (mut along, mut length, mut inverse) = ([[zero; 2]; 3], [zero; 3], [zero; 3]);
@@ -51,14 +50,14 @@ pub fn insets(context: &RasterContext<'_>, ids: &[u32; LANES], half: [i32; 2], h
     let mut out = Insets::EMPTY;
     for k in 0..3 {
         for axis in 0..2 {
-            out.corners[k][axis] = to_ints(corners[axis][k]);
-            out.units[k][axis] = to_floats(_mm256_mul_ps(along[k][axis], _mm256_mul_ps(inverse[k], turn)));
-            out.insets[k][axis] = to_floats(insets[k][axis]);
+            out.corners[k][axis] = must_cast(corners[axis][k]);
+            out.units[k][axis] = must_cast(_mm256_mul_ps(along[k][axis], _mm256_mul_ps(inverse[k], turn)));
+            out.insets[k][axis] = must_cast(insets[k][axis]);
         }
-        out.slopes[k] = to_floats(slope(insets[k], insets[(k + 1) % 3]));
+        out.slopes[k] = must_cast(slope(insets[k], insets[(k + 1) % 3]));
     }
-    out.turn = to_floats(turn);
-    out.is_open = to_words(_mm256_srli_epi32::<31>(_mm256_castps_si256(is_clear)));
+    out.turn = must_cast(turn);
+    out.is_open = must_cast(_mm256_srli_epi32::<31>(_mm256_castps_si256(is_clear)));
     out
 }
 
@@ -78,7 +77,7 @@ fn slope(from: [__m256; 2], to: [__m256; 2]) -> __m256 {
 /// As `areas_plainly` of an inset.
 #[target_feature(enable = "avx2")]
 pub fn areas(inset: &Inset, lefts: &[f32; LANES], tops: &[f32; LANES]) -> [u32; LANES] {
-    let (left, top) = (from_floats(lefts), from_floats(tops));
+    let (left, top) = (must_cast::<_, __m256>(*lefts), must_cast::<_, __m256>(*tops));
     let mut areas = _mm256_setzero_ps();
     for side in &inset.sides {
         let [[x0, y0], [x1, _]] = side.ends;
@@ -93,7 +92,7 @@ pub fn areas(inset: &Inset, lefts: &[f32; LANES], tops: &[f32; LANES]) -> [u32; 
     }
     let area = clamp(_mm256_mul_ps(areas, _mm256_set1_ps(inset.turn)));
     let units = _mm256_add_ps(_mm256_mul_ps(area, _mm256_set1_ps(HOLE_UNIT)), _mm256_set1_ps(0.5));
-    to_words(_mm256_cvttps_epi32(units))
+    must_cast(_mm256_cvttps_epi32(units))
 }
 
 /// As `mean_clamped` of insets. Where `a` and `b` are equal, the mean is NaN: the first minimum turns

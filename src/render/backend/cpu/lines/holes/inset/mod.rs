@@ -329,7 +329,7 @@ mod tests {
 
     fn inset_of(corners: [[i32; 2]; 3], width_px: f32) -> Option<Inset> {
         let lanes = |axis: usize| std::array::from_fn(|k| [corners[k][axis]; LANES]);
-        let insets = Insets::new(&Corners { x: lanes(0), y: lanes(1), z: [[0.0; LANES]; 3] }, HALF, width_px * 128.0);
+        let insets = Insets::new(&Corners { x: lanes(0), y: lanes(1) }, HALF, width_px * 128.0);
         (insets.is_open[5] != 0).then(|| insets.get(5, HALF))
     }
 
