@@ -1,13 +1,20 @@
 //! The compute pipelines, made when a plan first needs them.
 
-pub(crate) mod bindings;
 pub(crate) mod file;
 pub(crate) mod kernels;
 pub(crate) mod key;
+pub(crate) mod reflection;
+pub(crate) mod shaders;
+#[cfg(test)]
+pub(crate) mod tests;
 use std::collections::HashMap;
+use std::hash::Hash;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use bytemuck::CheckedBitPattern;
+
 use self::file::PipelineFile;
+use self::reflection::{Binding, Reflection};
 use crate::backend::DrawStage;
 
 /// A kernel, in one of its variants.
@@ -99,7 +106,7 @@ pub enum SampleTarget {
 }
 
 /// Buffers by their binding number in group 1 of every shader.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, CheckedBitPattern)]
 #[repr(u32)]
 pub enum Slot {
     Positions,
@@ -145,10 +152,19 @@ pub enum Access {
     ReadWrite,
 }
 
-/// A pipeline and the layout of its group 1.
+/// A pipeline, and the buffers of its group 1 with their layout.
 pub struct Pipeline {
     pub pipeline: wgpu::ComputePipeline,
+    pub slots: Vec<Slot>,
     pub buffers: wgpu::BindGroupLayout,
+}
+
+/// A kernel's code.
+struct Module {
+    /// What it uses.
+    reflection: Reflection,
+    /// The code as wgpu has checked it.
+    checked: OnceLock<wgpu::ShaderModule>,
 }
 
 /// Things by key, each made by the first thread that needs it.
@@ -159,8 +175,8 @@ type MadeOnce<K, T> = Mutex<HashMap<K, Arc<OnceLock<T>>>>;
 #[derive(Default)]
 pub struct Pipelines {
     made: MadeOnce<(Kernel, u32), Arc<Pipeline>>,
-    /// By kernel, without the phase, and by whether gangs share it: its code as wgpu has checked it.
-    modules: MadeOnce<(Kernel, bool), wgpu::ShaderModule>,
+    /// By kernel, without the phase, and by whether gangs share it.
+    modules: MadeOnce<(Kernel, bool), Arc<Module>>,
     /// The driver's own form of the pipelines, kept on disk.
     file: Option<PipelineFile>,
 }
@@ -173,17 +189,18 @@ impl Pipelines {
 
     /// The pipeline of a kernel for a plan with this key.
     pub fn get(&self, device: &wgpu::Device, kernel: Kernel, key: u32) -> Arc<Pipeline> {
-        let key = key & kernel.key_bits();
-        let place =
-            Arc::clone(self.made.lock().unwrap_or_else(PoisonError::into_inner).entry((kernel, key)).or_default());
-        Arc::clone(place.get_or_init(|| Arc::new(self.make(device, kernel, key))))
+        let module = self.module(kernel, key);
+        let key = key & module.reflection.key_bits;
+        made_once(&self.made, (kernel, key), || Arc::new(self.make(device, kernel, key, &module)))
     }
 
     /// Those of the kernels that have no pipeline for this key yet.
     pub fn missing(&self, kernels: &[Kernel], key: u32) -> Vec<Kernel> {
-        let made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_made =
-            |kernel: &Kernel| made.get(&(*kernel, key & kernel.key_bits())).is_some_and(|p| p.get().is_some());
+        let is_made = |kernel: &Kernel| {
+            let key = key & self.module(*kernel, key).reflection.key_bits;
+            let made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+            made.get(&(*kernel, key)).is_some_and(|p| p.get().is_some())
+        };
         kernels.iter().copied().filter(|kernel| !is_made(kernel)).collect()
     }
 
@@ -200,14 +217,24 @@ impl Pipelines {
         self.modules.lock().unwrap_or_else(PoisonError::into_inner).clear();
     }
 
-    fn make(&self, device: &wgpu::Device, kernel: Kernel, key: u32) -> Pipeline {
-        let of = (kernel.in_one_phase(), key & key::GANG != 0);
-        let place = Arc::clone(self.modules.lock().unwrap_or_else(PoisonError::into_inner).entry(of).or_default());
-        let module = place.get_or_init(|| kernel.module(device, of.1));
-        let pipeline = kernel.compile(device, key, module, self.file.as_ref().map(PipelineFile::cache));
+    fn make(&self, device: &wgpu::Device, kernel: Kernel, key: u32, module: &Module) -> Pipeline {
+        let checked = module.checked.get_or_init(|| kernel.module(device, key & key::GANG != 0));
+        let buffers = &module.reflection.buffers;
+        let pipeline = kernel.compile(device, key, checked, buffers, self.file.as_ref().map(PipelineFile::cache));
         tracing::debug!(?kernel, key, "made a pipeline");
         pipeline
     }
+
+    fn module(&self, kernel: Kernel, key: u32) -> Arc<Module> {
+        let (kernel, is_of_gang) = (kernel.in_one_phase(), key & key::GANG != 0);
+        let make = || Arc::new(Module { reflection: kernel.reflection(is_of_gang), checked: OnceLock::new() });
+        made_once(&self.modules, (kernel, is_of_gang), make)
+    }
+}
+
+fn made_once<K: Eq + Hash, T: Clone>(things: &MadeOnce<K, T>, key: K, make: impl FnOnce() -> T) -> T {
+    let place = Arc::clone(things.lock().unwrap_or_else(PoisonError::into_inner).entry(key).or_default());
+    place.get_or_init(make).clone()
 }
 
 /// The layout of group 0: the plan's uniforms, and the dispatch's at a dynamic offset.
@@ -260,10 +287,12 @@ impl Kernel {
         device: &wgpu::Device,
         key: u32,
         module: &wgpu::ShaderModule,
+        buffers: &[Binding],
         cache: Option<&wgpu::PipelineCache>,
     ) -> Pipeline {
         let label = Some(self.entry());
-        let entries: Vec<_> = self.buffers().iter().map(|&(slot, access)| buffer_entry(slot, access)).collect();
+        let slots = buffers.iter().map(|&(slot, _)| slot).collect();
+        let entries: Vec<_> = buffers.iter().map(|&(slot, access)| buffer_entry(slot, access)).collect();
         let buffers = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label,
@@ -282,7 +311,7 @@ impl Kernel {
             },
             cache,
         });
-        Pipeline { pipeline, buffers }
+        Pipeline { pipeline, slots, buffers }
     }
 }
 
