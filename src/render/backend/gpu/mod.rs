@@ -150,7 +150,6 @@ impl GpuRenderer {
             // Not before: a buffer may not have been filled if something went wrong.
             filled.into_iter().for_each(|(slot, source, buffer)| self.gpu.residents.keep(slot, &source, buffer));
         }
-        self.gpu.job_ended();
         // After an error the buffers may still be in use, and the staging buffer may be half
         // mapped.
         if result.is_ok() {

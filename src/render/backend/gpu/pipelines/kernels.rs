@@ -1,6 +1,7 @@
 //! What a kernel is made of, and what is bound to it.
 
 use super::key;
+use super::prune::pruned;
 use super::reflection::Reflection;
 use super::shaders::{files_of, text_of};
 use super::{Kernel, SampleTarget, SampleWrite, Slot};
@@ -35,27 +36,20 @@ impl Kernel {
         }
     }
 
-    /// The kernel in the first of its phases, whose source is that of all.
-    pub fn in_one_phase(self) -> Self {
-        let first = |write: SampleWrite| if write == SampleWrite::Id { SampleWrite::Depth } else { write };
-        match self {
-            Self::Visibility { write, target } => Self::Visibility { write: first(write), target },
-            Self::VisibilityTile { write, target } => Self::VisibilityTile { write: first(write), target },
-            Self::VisibilityFew { write } => Self::VisibilityFew { write: first(write) },
-            other => other,
-        }
-    }
-
     /// The kernel's files, one after the other.
     pub fn source(self, is_of_gang: bool) -> String {
         self.files(is_of_gang).into_iter().map(text_of).collect()
     }
 
-    /// What the code uses.
-    pub fn reflection(self, is_of_gang: bool) -> Reflection {
-        let mut reflection = Reflection::of(self.entry(), &self.source(is_of_gang));
-        reflection.key_bits |= if is_of_gang { key::GANG } else { 0 };
-        reflection
+    /// The kernel's code, without what a pipeline with this key does not run.
+    pub fn source_for(self, key: u32) -> String {
+        pruned(&self.source(key & key::GANG != 0), key)
+    }
+
+    /// Bits of the key that the code depends on.
+    pub fn key_bits(self, is_of_gang: bool) -> u32 {
+        let bits = Reflection::of(self.entry(), &self.source(is_of_gang)).key_bits;
+        bits | if is_of_gang { key::GANG } else { 0 }
     }
 
     /// The kernel's files in shaders/.

@@ -3,6 +3,7 @@
 pub(crate) mod file;
 pub(crate) mod kernels;
 pub(crate) mod key;
+pub(crate) mod prune;
 pub(crate) mod reflection;
 pub(crate) mod shaders;
 #[cfg(test)]
@@ -14,7 +15,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use bytemuck::CheckedBitPattern;
 
 use self::file::PipelineFile;
-use self::reflection::{Binding, Reflection};
+use self::reflection::Reflection;
 use crate::backend::DrawStage;
 
 /// A kernel, in one of its variants.
@@ -159,14 +160,6 @@ pub struct Pipeline {
     pub buffers: wgpu::BindGroupLayout,
 }
 
-/// A kernel's code.
-struct Module {
-    /// What it uses.
-    reflection: Reflection,
-    /// The code as wgpu has checked it.
-    checked: OnceLock<wgpu::ShaderModule>,
-}
-
 /// Things by key, each made by the first thread that needs it.
 type MadeOnce<K, T> = Mutex<HashMap<K, Arc<OnceLock<T>>>>;
 
@@ -175,8 +168,8 @@ type MadeOnce<K, T> = Mutex<HashMap<K, Arc<OnceLock<T>>>>;
 #[derive(Default)]
 pub struct Pipelines {
     made: MadeOnce<(Kernel, u32), Arc<Pipeline>>,
-    /// By kernel, without the phase, and by whether gangs share it.
-    modules: MadeOnce<(Kernel, bool), Arc<Module>>,
+    /// Bits of the key that a kernel depends on, by kernel and by whether gangs share it.
+    key_bits: MadeOnce<(Kernel, bool), u32>,
     /// The driver's own form of the pipelines, kept on disk.
     file: Option<PipelineFile>,
 }
@@ -189,15 +182,18 @@ impl Pipelines {
 
     /// The pipeline of a kernel for a plan with this key.
     pub fn get(&self, device: &wgpu::Device, kernel: Kernel, key: u32) -> Arc<Pipeline> {
-        let module = self.module(kernel, key);
-        let key = key & module.reflection.key_bits;
-        made_once(&self.made, (kernel, key), || Arc::new(self.make(device, kernel, key, &module)))
+        let key = self.key_of(kernel, key);
+        made_once(&self.made, (kernel, key), || {
+            let pipeline = Arc::new(kernel.compile(device, key, self.file.as_ref().map(PipelineFile::cache)));
+            tracing::debug!(?kernel, key, "made a pipeline");
+            pipeline
+        })
     }
 
     /// Those of the kernels that have no pipeline for this key yet.
     pub fn missing(&self, kernels: &[Kernel], key: u32) -> Vec<Kernel> {
         let is_made = |kernel: &Kernel| {
-            let key = key & self.module(*kernel, key).reflection.key_bits;
+            let key = self.key_of(*kernel, key);
             let made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
             made.get(&(*kernel, key)).is_some_and(|p| p.get().is_some())
         };
@@ -214,21 +210,12 @@ impl Pipelines {
     /// Drops all pipelines; jobs that use one keep it until they end.
     pub fn clear(&self) {
         self.made.lock().unwrap_or_else(PoisonError::into_inner).clear();
-        self.modules.lock().unwrap_or_else(PoisonError::into_inner).clear();
     }
 
-    fn make(&self, device: &wgpu::Device, kernel: Kernel, key: u32, module: &Module) -> Pipeline {
-        let checked = module.checked.get_or_init(|| kernel.module(device, key & key::GANG != 0));
-        let buffers = &module.reflection.buffers;
-        let pipeline = kernel.compile(device, key, checked, buffers, self.file.as_ref().map(PipelineFile::cache));
-        tracing::debug!(?kernel, key, "made a pipeline");
-        pipeline
-    }
-
-    fn module(&self, kernel: Kernel, key: u32) -> Arc<Module> {
-        let (kernel, is_of_gang) = (kernel.in_one_phase(), key & key::GANG != 0);
-        let make = || Arc::new(Module { reflection: kernel.reflection(is_of_gang), checked: OnceLock::new() });
-        made_once(&self.modules, (kernel, is_of_gang), make)
+    /// The bits of a plan's key that a kernel depends on.
+    fn key_of(&self, kernel: Kernel, key: u32) -> u32 {
+        let is_of_gang = key & key::GANG != 0;
+        key & made_once(&self.key_bits, (kernel, is_of_gang), || kernel.key_bits(is_of_gang))
     }
 }
 
@@ -243,7 +230,7 @@ pub fn uniforms_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         layout_entry(
             binding,
             wgpu::BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Uniform,
+                ty: wgpu::BufferBindingType::Storage { read_only: true },
                 has_dynamic_offset,
                 min_binding_size: None,
             },
@@ -276,33 +263,23 @@ impl Kernel {
         }
     }
 
-    /// The kernel's code, checked.
-    fn module(self, device: &wgpu::Device, is_of_gang: bool) -> wgpu::ShaderModule {
-        let source = wgpu::ShaderSource::Wgsl(self.source(is_of_gang).into());
-        device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(self.entry()), source })
-    }
-
-    fn compile(
-        self,
-        device: &wgpu::Device,
-        key: u32,
-        module: &wgpu::ShaderModule,
-        buffers: &[Binding],
-        cache: Option<&wgpu::PipelineCache>,
-    ) -> Pipeline {
+    fn compile(self, device: &wgpu::Device, key: u32, cache: Option<&wgpu::PipelineCache>) -> Pipeline {
         let label = Some(self.entry());
-        let slots = buffers.iter().map(|&(slot, _)| slot).collect();
-        let entries: Vec<_> = buffers.iter().map(|&(slot, access)| buffer_entry(slot, access)).collect();
+        let source = self.source_for(key);
+        let bound = Reflection::of(self.entry(), &source).buffers;
+        let entries: Vec<_> = bound.iter().map(|&(slot, access)| buffer_entry(slot, access)).collect();
         let buffers = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label,
             bind_group_layouts: &[Some(&uniforms_layout(device)), Some(&buffers)],
             immediate_size: 0,
         });
+        let source = wgpu::ShaderSource::Wgsl(source.into());
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source });
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label,
             layout: Some(&layout),
-            module,
+            module: &module,
             entry_point: label,
             compilation_options: wgpu::PipelineCompilationOptions {
                 constants: &self.constants(key),
@@ -311,7 +288,7 @@ impl Kernel {
             },
             cache,
         });
-        Pipeline { pipeline, slots, buffers }
+        Pipeline { pipeline, slots: bound.into_iter().map(|(slot, _)| slot).collect(), buffers }
     }
 }
 

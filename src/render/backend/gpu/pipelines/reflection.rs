@@ -64,7 +64,7 @@ fn declared_buffer(line: &str) -> Option<(&str, Binding)> {
 }
 
 /// The unsigned constant that a line of code defines: name and value.
-fn constant(line: &str) -> Option<(&str, u32)> {
+pub fn constant(line: &str) -> Option<(&str, u32)> {
     let (name, value) = line.strip_prefix("const ")?.strip_suffix("u;")?.split_once(": u32 = ")?;
     let value = value.strip_prefix("0x").map_or_else(|| value.parse(), |digits| u32::from_str_radix(digits, 16));
     Some((name, value.ok()?))

@@ -6,6 +6,8 @@ use std::path::Path;
 use wgpu::naga;
 use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 
+use super::prune::pruned;
+use super::reflection::Reflection;
 use super::shaders::{FILES, text_of};
 use super::{Access, Kernel, SampleTarget, SampleWrite, Slot, key};
 use crate::backend::gpu::schedule::WORKGROUP;
@@ -74,8 +76,10 @@ fn kernels_bind_what_their_code_uses() {
                 used.insert(at.binding, (name, if is_written { Access::ReadWrite } else { Access::Read }));
             }
         }
-        let bound =
-            kernel.reflection(is_of_gang).buffers.into_iter().map(|(slot, access)| (slot as u32, (slot, access)));
+        let bound = Reflection::of(kernel.entry(), &kernel.source(is_of_gang))
+            .buffers
+            .into_iter()
+            .map(|(slot, access)| (slot as u32, (slot, access)));
         let bound: BTreeMap<u32, (Slot, Access)> = bound.collect();
         assert!(used.keys().eq(bound.keys()), "{kernel:?} uses {used:?} and binds {bound:?}");
         for (binding, (name, access)) in used {
@@ -144,7 +148,7 @@ fn pipelines_are_specialised_by_the_bits_that_their_code_asks_for() {
                 asked += 1;
             }
         }
-        assert_eq!(kernel.reflection(is_of_gang).key_bits, bits, "{kernel:?}");
+        assert_eq!(kernel.key_bits(is_of_gang), bits, "{kernel:?}");
     }
     assert!(asked > 200, "{asked}");
 }
@@ -345,4 +349,58 @@ fn shaders_say_which_files_they_use() {
             assert!(!is_global || is_known, "{name} uses {word}: add it to `// Uses:`, with the file that defines it");
         }
     }
+}
+
+#[test]
+fn blocks_of_flags_that_the_key_lacks_are_left_out() {
+    let code = "const A: u32 = 1u;
+const B: u32 = 0x2u;
+fn f() {
+    if has(A) {
+        a();
+        if has(B) && c {
+            b();
+        }
+    } else {
+        d();
+    }
+    if has(B) || c {
+        b();
+    }
+    if has(A | B) {
+        e();
+    }
+}
+";
+    let without_blanks =
+        |key| pruned(code, key).lines().skip(3).filter(|line| !line.is_empty()).collect::<Vec<_>>().join("");
+    let rest = "    if has(B) || c {        b();    }    if has(A | B) {        e();    }}";
+    let nested = "        if has(B) && c {            b();        }";
+    assert_eq!(without_blanks(0), format!("{{        d();    }}{rest}"));
+    assert_eq!(without_blanks(1), format!("    if has(A) {{        a();    }} else {{        d();    }}{rest}"));
+    assert_eq!(
+        without_blanks(3),
+        format!("    if has(A) {{        a();{nested}    }} else {{        d();    }}{rest}")
+    );
+}
+
+#[test]
+fn kernels_are_whole_without_what_any_flag_brings() {
+    let (mut cases, mut shorter) = (0, 0);
+    for (kernel, is_of_gang) in forms() {
+        let bits = kernel.key_bits(is_of_gang);
+        let whole = kernel.source_for(bits).len();
+        let gang = bits & key::GANG;
+        let each = (0..32).map(|bit| 1 << bit).filter(|flag| bits & flag & !gang != 0);
+        for key in each.flat_map(|flag| [flag | gang, bits & !flag]).chain([gang]) {
+            let source = kernel.source_for(key);
+            let module = naga::front::wgsl::parse_str(&source)
+                .unwrap_or_else(|error| panic!("{kernel:?}, {key:#x}: {}", error.emit_to_string(&source)));
+            let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
+            validator.validate(&module).unwrap_or_else(|error| panic!("{kernel:?}, {key:#x}: {error:?}"));
+            cases += 1;
+            shorter += usize::from(source.len() < whole);
+        }
+    }
+    assert!(cases > 300 && shorter > cases / 3, "{shorter} of {cases}");
 }
