@@ -410,6 +410,7 @@ impl DrawReport {
 /// The stages whose durations a response reports. Each is announced when it ends; of a sheet, once for each
 /// view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Stage {
     /// Bytes to mesh.
     Parse,
