@@ -1,7 +1,7 @@
 //! Statements about meshes: the [`report`] on one, its [`check`] by rules, and the [`diff`] of two.
 //!
-//! [`opened`] has the files that are judged or compared, and the pictures of what was found. [`geometry`] answers questions
-//! that drawing does not ask.
+//! [`opened`] has the files that are judged or compared, and the pictures of what was found. [`geometry`] has what they
+//! compute: distances, thickness, intersections, charts of texture coordinates.
 
 pub mod check;
 pub mod diff;

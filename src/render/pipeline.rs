@@ -11,10 +11,10 @@ mod faces;
 
 pub use faces::{FaceBuffer, find_faces};
 
-use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes};
+use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes, Renderer};
 use crate::caption::{Scale, draw_legend};
 use crate::encode::{self, EncodeError};
-use crate::image::{Image, ImageFormat, RowSink};
+use crate::image::{Image, ImageFormat, LinearImage, RowSink};
 use crate::import::{self, Bundle, Format, Imported, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
@@ -93,6 +93,19 @@ pub fn draw(model: &Model, spec: &Spec, mut cx: Context<'_>) -> Result<Drawn, Re
     }
 }
 
+/// Bytes per pixel of a picture in linear light: its half floats, and the colours that they are rounded from.
+const LINEAR_BYTES: u64 = 8 + 16;
+
+/// The same in linear light, of one view: a sheet and a legend are left out.
+pub fn draw_linear(model: &Model, spec: &Spec, mut cx: Context<'_>) -> Result<Drawn<LinearImage>, RenderError> {
+    let spec = Spec { sheet: None, ..spec.clone() };
+    let pixels = u64::from(spec.image.width_px) * u64::from(spec.image.height_px);
+    cx.budget.spend("the picture in linear light", pixels, LINEAR_BYTES).map_err(PlanError::Limit)?;
+    let mut draw =
+        |renderer: &mut dyn Renderer, plan: &DrawPlan<'_>, deadline: &Deadline| renderer.draw_linear(plan, deadline);
+    draw_view_by(model.view(), &spec, &mut cx, &mut draw, |_, _, _| {})
+}
+
 /// Draws all views of a sheet: into a grid, or else as the frames of an animation, from top to bottom.
 fn draw_sheet(
     view: View<'_>,
@@ -150,9 +163,33 @@ pub fn draw_cells(
 pub fn draw_view(
     view: View<'_>,
     spec: &Spec,
-    sink: Option<&mut dyn RowSink>,
+    mut sink: Option<&mut dyn RowSink>,
     cx: &mut Context<'_>,
 ) -> Result<Drawn, RenderError> {
+    let mut draw = |renderer: &mut dyn Renderer, plan: &DrawPlan<'_>, deadline: &Deadline| match sink.as_deref_mut() {
+        Some(sink) => renderer.draw_rows(plan, sink, deadline),
+        None => renderer.draw(plan, deadline),
+    };
+    draw_view_by(view, spec, cx, &mut draw, |image, spec, plan| {
+        if spec.image.legend {
+            let legends = plan.legends.iter();
+            let scales = legends.map(|plan::Legend { title, ends, colors }| Scale { title, ends: *ends, colors });
+            draw_legend(image, &scales.collect::<Vec<_>>());
+        }
+    })
+}
+
+/// Draws a plan on a back-end.
+type Draw<'a, I> = &'a mut dyn FnMut(&mut dyn Renderer, &DrawPlan<'_>, &Deadline) -> Result<I, DrawError>;
+
+/// Has a back-end draw one view, and finishes its picture.
+fn draw_view_by<I>(
+    view: View<'_>,
+    spec: &Spec,
+    cx: &mut Context<'_>,
+    draw: Draw<'_, I>,
+    finish: impl FnOnce(&mut I, &Spec, &DrawPlan<'_>),
+) -> Result<Drawn<I>, RenderError> {
     let Context { backends, budget, deadline, ended } = cx;
     let has_gpu = backends.has_gpu();
     with_scene(view, spec, has_gpu, budget, deadline, |staged, budget| {
@@ -164,12 +201,8 @@ pub fn draw_view(
         ended(Stage::Plan);
 
         // DrawPlan -> Image
-        let mut drawn = backends.draw(scene.spec.backend, &plan, sink, deadline)?;
-        if scene.spec.image.legend {
-            let legends = plan.legends.iter();
-            let scales = legends.map(|plan::Legend { title, ends, colors }| Scale { title, ends: *ends, colors });
-            draw_legend(&mut drawn.image, &scales.collect::<Vec<_>>());
-        }
+        let mut drawn = backends.draw_by(scene.spec.backend, &plan, &mut |renderer| draw(renderer, &plan, deadline))?;
+        finish(&mut drawn.image, scene.spec, &plan);
         ended(Stage::Render);
 
         let of_layout = std::mem::take(&mut warnings.of_layout);
@@ -331,9 +364,9 @@ pub struct Output {
 
 /// The output of [`draw`].
 #[derive(Debug)]
-pub struct Drawn {
+pub struct Drawn<I = Image> {
     /// The picture.
-    pub image: Image,
+    pub image: I,
     /// The way it was drawn.
     pub report: DrawReport,
 }
@@ -377,6 +410,7 @@ impl DrawReport {
 /// The stages whose durations a response reports. Each is announced when it ends; of a sheet, once for each
 /// view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Stage {
     /// Bytes to mesh.
     Parse,

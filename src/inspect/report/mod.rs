@@ -21,11 +21,12 @@ use crate::geometry::intersections;
 use crate::geometry::measure::Measures;
 use meshsnap_render::import::{self, Bundle, FileContent, FileMetadata, ImportReport, Imported, MeshError};
 use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
 use meshsnap_render::mesh::edges::EdgeList;
 use meshsnap_render::mesh::material::{FileLens, ImageContent, ImageSource};
 use meshsnap_render::mesh::topology::Topology;
-use meshsnap_render::mesh::{Mesh, UpAxis};
 use meshsnap_render::pipeline::Stage;
+use meshsnap_render::spec::words::word_for;
 use meshsnap_render::texture::{TextureError, decode, fault_warnings};
 use serde::Serialize;
 
@@ -236,7 +237,7 @@ impl Report {
             format: import.format.name(),
             generator,
             file_bytes,
-            up: up(mesh.up),
+            up: word_for(mesh.up),
             scenes,
             nodes,
             meshes,
@@ -303,17 +304,5 @@ fn camera(name: String, lens: FileLens) -> CameraReport {
         FileLens::Orthographic { height } => {
             CameraReport { name, projection: "orthographic", fov_deg: None, height: Some(height) }
         }
-    }
-}
-
-/// The axis in the words of the request's `camera.up`.
-fn up(axis: UpAxis) -> &'static str {
-    match axis {
-        UpAxis::X => "x",
-        UpAxis::NegX => "-x",
-        UpAxis::Y => "y",
-        UpAxis::NegY => "-y",
-        UpAxis::Z => "z",
-        UpAxis::NegZ => "-z",
     }
 }

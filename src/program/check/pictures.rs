@@ -1,4 +1,4 @@
-//! Pictures of checked files: each view as it is, as it was accepted, and what differs; faults are marked.
+//! Pictures for reports of `check`: each view of a file now, its accepted picture, and their difference. Faults are marked.
 
 use std::fs;
 use std::path::{Path, PathBuf};

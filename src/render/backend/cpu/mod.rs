@@ -19,7 +19,7 @@ pub(super) mod lines;
 pub(super) mod mixed;
 pub(super) mod occlusion;
 pub(crate) mod peeling;
-mod resolve;
+pub(super) mod resolve;
 mod row_queue;
 mod stopwatch;
 pub(super) mod surface;
@@ -33,6 +33,7 @@ use threads::ThreadShare;
 use std::ops::Range;
 use std::sync::Arc;
 
+use half::f16;
 use rayon::prelude::*;
 
 use self::bands::bins::Bins;
@@ -45,7 +46,7 @@ use self::stopwatch::Stopwatch;
 use self::surface::flat::FlatColors;
 use super::{BackendKind, DrawError, DrawStage, DrawTimes, Renderer};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
-use crate::image::{Image, RowSink};
+use crate::image::{Image, LinearImage, RowSink};
 use crate::limits::Deadline;
 use crate::plan::{DrawPlan, OcclusionPass};
 
@@ -363,6 +364,12 @@ impl Renderer for CpuRenderer {
         deadline: &Deadline,
     ) -> Result<Image, DrawError> {
         self.draw_picture(plan, Some(sink), deadline)
+    }
+
+    fn draw_linear(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<LinearImage, DrawError> {
+        let mut rgba = vec![[f16::ZERO; 4]; plan.width_px as usize * plan.height_px as usize];
+        self.draw_bands(plan, deadline, (Goal::Picture, &mut rgba), bands::draw_linear)?;
+        Ok(LinearImage { width_px: plan.width_px, height_px: plan.height_px, rgba })
     }
 
     fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {

@@ -4,8 +4,8 @@
 //! `recorder` turns them into commands; `pipelines` holds each kernel's source, bindings and
 //! specialisation; `stage_clock` times the stages; `params` holds the uniforms, `buffers` a job's memory,
 //! `staging` the buffers that pictures are read from, `residents` what stays in memory for the next job,
-//! `gang` the jobs that share dispatches, `pass_mask` the passes over triangles. `displays` keeps drivers
-//! from looking for a window system.
+//! `gang` the jobs that share dispatches, `pass_mask` the passes over triangles, `linear` pictures in linear
+//! light. `displays` keeps drivers from looking for a window system.
 //!
 //! **Invariant:** a job uses the device on one thread only, because wgpu's error scopes belong to a
 //! thread.
@@ -15,6 +15,7 @@ mod device;
 mod displays;
 mod gang;
 mod handles;
+mod linear;
 pub(super) mod params;
 pub(crate) mod pass_mask;
 pub(crate) mod pipelines;
@@ -40,14 +41,14 @@ use self::recorder::Recorder;
 use self::residents::{ListLookup, Source};
 use self::schedule::Schedule;
 use self::schedule::sizes::{
-    DeviceTraits, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, is_painted,
-    occlusion_bytes, owner_bytes, samples, work_bytes,
+    DeviceTraits, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, occlusion_bytes,
+    owner_bytes, samples, work_bytes,
 };
 use self::schedule::step::{Band, Goal, Step};
 use self::stage_clock::StageClock;
 use self::staging::Mapped;
 use super::{BackendKind, DrawError, DrawTimes, Renderer};
-use crate::image::{Image, Pixels, srgb8_thresholds};
+use crate::image::{Image, LinearImage, Pixels, srgb8_thresholds};
 use crate::limits::Deadline;
 use crate::plan::{CornerValues, DrawPlan, HullVertex, SurfacePass};
 
@@ -170,6 +171,13 @@ impl Renderer for GpuRenderer {
         match self.draw_once(plan, deadline) {
             // Perhaps there was no memory left.
             Err(DrawError::Device(_)) if self.gpu.free_spare_memory() => self.draw_once(plan, deadline),
+            result => result,
+        }
+    }
+
+    fn draw_linear(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<LinearImage, DrawError> {
+        match self.draw_linear_once(plan, deadline) {
+            Err(DrawError::Device(_)) if self.gpu.free_spare_memory() => self.draw_linear_once(plan, deadline),
             result => result,
         }
     }
@@ -407,7 +415,7 @@ fn upload_geometry(
 /// Supplies the input of shade, lines and resolve, and reserves their output.
 fn upload_shading(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule: &Schedule) -> Result<(), DrawError> {
     let band_pixels = u64::from(plan.width_px) * u64::from(schedule.banding.rows);
-    if !is_painted(plan) && (has_visibility(plan) || !plan.lines.is_empty()) {
+    if !schedule.is_painted(plan) && (has_visibility(plan) || !plan.lines.is_empty()) {
         buffers.reserve(&gpu.handles, Slot::Colors, band_pixels * color_bytes(plan))?;
     }
     if plan.has_mixed() {
@@ -544,7 +552,7 @@ fn clear_band(
     if has_visibility(plan) && clears_samples {
         recorder.clear(Slot::Samples, schedule.banding.seen_samples(plan) * SAMPLE_BYTES)?;
     }
-    if schedule.goal == Goal::Picture && !plan.lines.is_empty() {
+    if schedule.goal.is_shown() && !plan.lines.is_empty() {
         let pixels = u64::from(plan.width_px) * u64::from(schedule.banding.rows);
         recorder.clear(Slot::Strokes, pixels * STROKES_BYTES)?;
         if owner_bytes(plan) > 0 {

@@ -1,5 +1,5 @@
-//! Triangles that lie in the file become what the same triangles with indices become, on any number
-//! of threads.
+//! Triangles without indices (as in STL) become the same mesh as the same triangles with indices, on any number of
+//! threads.
 
 use super::normalise;
 use crate::import::bundle::{Bundle, entry};

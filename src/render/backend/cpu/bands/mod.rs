@@ -12,13 +12,14 @@ pub(crate) mod triangle_bins;
 
 use std::ops::ControlFlow;
 
+use half::f16;
+
 use self::bins::{Bins, EdgeBin};
 use self::lists::BandLists;
 use self::scratch::BandScratch;
 use self::triangle_bins::TriangleBin;
 use super::isa::{LANES, dispatch};
 use super::{RasterContext, resolve};
-use crate::backend::DrawStage;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::batch::Batch;
 use crate::backend::cpu::geometry::nearest::Nearest;
@@ -42,6 +43,7 @@ use crate::backend::cpu::resolve::Resolver;
 use crate::backend::cpu::surface::flat::{draw_flat, shade_flat};
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::cpu::surface::together::shade_band;
+use crate::backend::{DrawStage, linear};
 use crate::plan::{LinePass, OcclusionPass};
 
 /// Edges between two polls of the deadline. Wide lines count their pixels too.
@@ -50,7 +52,6 @@ const EDGES_PER_POLL: usize = 256;
 /// Draws band number `band` into its rows of the picture.
 pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, rgba: &mut [u8]) {
     let (plan, isa) = (context.plan, context.isa);
-    let pixels = rgba.len() / 4;
     let mut lap = context.watch.begin();
     fill_samples(context, scratch, bins, band);
     lap.end(DrawStage::Visibility);
@@ -74,6 +75,37 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
         }
         return;
     }
+    draw_colors(context, scratch, bins, band, rgba.len() / 4);
+    let mut lap = context.watch.begin();
+    resolve::resolve(isa, plan, context.srgb, scratch.samples.shown[0], &scratch.colors, rgba);
+    lap.end(DrawStage::Resolve);
+}
+
+/// Draws band number `band` into its rows of the picture in linear light.
+pub fn draw_linear(
+    context: &RasterContext<'_>,
+    scratch: &mut BandScratch,
+    bins: &Bins,
+    band: usize,
+    rgba: &mut [[f16; 4]],
+) {
+    let mut lap = context.watch.begin();
+    fill_samples(context, scratch, bins, band);
+    lap.end(DrawStage::Visibility);
+    draw_colors(context, scratch, bins, band, rgba.len());
+    let mut lap = context.watch.begin();
+    let width = context.plan.width_px as usize;
+    let rows = scratch.colors.chunks(width).zip(rgba.chunks_mut(width));
+    for (row, (colors, out)) in (scratch.samples.shown[0]..).zip(rows) {
+        linear::write_row(context.plan, row, colors.iter().copied(), out);
+    }
+    lap.end(DrawStage::Resolve);
+}
+
+/// Fills the colours of a band's pixels: all stages between visibility and resolve.
+fn draw_colors(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, pixels: usize) {
+    let (plan, isa) = (context.plan, context.isa);
+    let mut lap = context.watch.begin();
     scratch.colors.clear();
     scratch.colors.resize(pixels, [0.0; 4]);
     if let Some(pass) = plan.peeling() {
@@ -101,8 +133,6 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
         draw_lines(context, scratch, bins, band);
         lap.end(DrawStage::Lines);
     }
-    resolve::resolve(isa, plan, context.srgb, scratch.samples.shown[0], &scratch.colors, rgba);
-    lap.end(DrawStage::Resolve);
 }
 
 /// Draws band number `band` of the visibility buffer, and writes the places of its pixels for the

@@ -1,5 +1,5 @@
-//! Walls that stand on a floor of one sheet: their feet lie in its plane, are visible from above, and are
-//! hidden from below.
+//! Lines of walls that stand on a floor without thickness: their feet lie in its plane, are visible from above,
+//! and are hidden from below.
 
 use std::fmt::Write as _;
 
@@ -22,7 +22,7 @@ enum Standing {
     Walls,
     /// A box with a bottom, which lies in the floor's plane and may be seen as well as the floor.
     Box,
-    /// Walls above and below, and a sheet between them: their edges have three faces.
+    /// Walls above and below, and the floor between them: their edges have three faces.
     Through,
     /// The same, those below first.
     ThroughTurnedOver,
