@@ -9,7 +9,7 @@ use super::farthest::Farthest;
 use super::holes::Holes;
 use super::segment::{PixelBox, SLACK_PX, Segment, rows};
 use super::stroke::{self, Direction, Mask, Pen, PixelDistances, Places};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::recip;
 use crate::backend::cpu::isa::LANES;

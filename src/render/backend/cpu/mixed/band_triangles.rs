@@ -5,9 +5,9 @@ use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use super::points::POINT_GRID;
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::{BandLists, BoxedFace, pair};
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 
 /// The triangles of a band.

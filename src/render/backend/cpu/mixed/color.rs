@@ -15,7 +15,7 @@ use super::points::{ALL_WORDS, Lattice, PointSet};
 use super::recent::Recent;
 use super::shares::{Share, Shares};
 use super::triangle::PointTriangle;
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::recip;

@@ -5,7 +5,7 @@
 
 use super::shade::{Shader, for_each_quarter, for_each_triangle};
 use super::waiting::{Point, Waiting};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
 use crate::backend::cpu::geometry::transform::recip;
 use crate::backend::cpu::isa::{LANES, dispatch};

@@ -14,7 +14,7 @@ use crate::backend::gpu::schedule::sizes::{
     JOBS_MAX, OCCLUSION_BYTES, SAMPLE_BYTES, color_bytes, is_painted, work_bytes,
 };
 use crate::backend::gpu::staging::Mapped;
-use crate::backend::gpu::{upload_geometry, upload_shading};
+use crate::backend::gpu::upload::{upload_geometry, upload_shading};
 use crate::image::Pixels;
 use crate::limits::Deadline;
 use crate::plan::{DrawPlan, HullVertex};

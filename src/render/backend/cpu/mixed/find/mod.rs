@@ -25,7 +25,7 @@ use self::look::Step;
 use self::pairs::Pairs;
 use self::thin::{mark_thin, may_mark};
 use super::band_triangles::BandTriangles;
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::isa::dispatch;

@@ -2,7 +2,7 @@
 
 use super::coarse::CoarseLooks;
 use super::look::{Look, Step, step_of_linked};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::NOTHING;
 
 /// Pairs that are remembered.
