@@ -41,7 +41,7 @@ pub use lines::{Edge, FaceSide, LinePass, Shown};
 pub use outline::{HullPass, HullVertex};
 pub use peeling::{ALPHA_MIN, PeelingPass, TINTS, pass_mask};
 pub use prepared::{MeshToken, Prepared};
-pub use projection::Projection;
+pub use projection::{PX, Projection, Projector};
 pub use quality::{QualitySelection, SelectedSpec, select_quality};
 pub use shared_slice::SharedSlice;
 pub use skips::{Skip, SkipKind};

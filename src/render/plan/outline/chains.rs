@@ -6,11 +6,11 @@
 
 use crate::limits::Deadline;
 use crate::mesh::union_find::UnionFind;
-use crate::plan::PlanError;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
-use crate::plan::outline::screen_edges::{OutlineView, PX, ScreenEdge};
+use crate::plan::outline::screen_edges::{OutlineView, ScreenEdge};
 use crate::plan::outline::silhouette_edges::SilhouetteEdge;
 use crate::plan::outline::visible_parts::VisiblePart;
+use crate::plan::{PX, PlanError};
 
 /// The least length of a chain, in multiples of its outline's width.
 const LENGTH_MIN: f64 = 4.0;

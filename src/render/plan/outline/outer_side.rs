@@ -71,7 +71,7 @@ fn depths(
         let [x, y, z, w] = view.homogeneous(*third);
         let from = [x / w - ends[0][0], y / w - ends[0][1]];
         let across = out * (right * from[1] - down * from[0]);
-        let is_known = w >= f64::from(view.view.projection.near_w) && across < -1e-6;
+        let is_known = w >= view.view.projector.near_w(0.0) && across < -1e-6;
         is_known.then(|| (z / w - ends[0][2] - slope_along * (right * from[0] + down * from[1])) / across)
     };
     let slope = edge.faces.iter().filter(|face| **face != Edge::NO_FACE).filter_map(|face| slope(*face));

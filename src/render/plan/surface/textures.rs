@@ -12,7 +12,7 @@ use crate::mesh::Mesh;
 use crate::mesh::material::{ImageContent, ImageSource, TextureRef, Wrap};
 use crate::plan::geometry::Geometry;
 use crate::plan::prepared::Prepared;
-use crate::plan::projection::Projection;
+use crate::plan::projection::Projector;
 use crate::plan::skips::{SkipKind, Skips};
 use crate::plan::surface::closeup;
 use crate::plan::surface::closeup::Use;
@@ -139,7 +139,7 @@ impl<'a> TextureLoader<'a> {
     pub fn finish(
         self,
         geometry: &Geometry<'_>,
-        projection: &Projection,
+        projector: &Projector,
         prepared: Option<&Prepared>,
         skips: &mut Skips<'_>,
     ) -> Result<LoadedTextures, PlanError> {
@@ -148,7 +148,7 @@ impl<'a> TextureLoader<'a> {
             return Ok(LoadedTextures { faults: faults.into_values().collect(), ..LoadedTextures::default() });
         }
         let sizes: Vec<[u32; 2]> = wanted.iter().map(|w| [w.header.width, w.header.height]).collect();
-        let mut finest = closeup::finest_levels(mesh, geometry, projection, &uses, wanted.len(), deadline)?;
+        let mut finest = closeup::finest_levels(mesh, geometry, projector, &uses, wanted.len(), deadline)?;
         for (level, size) in finest.iter_mut().zip(&sizes) {
             *level = (*level).min(mips::count(size[0], size[1]) - 1);
         }

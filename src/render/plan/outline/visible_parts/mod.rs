@@ -13,11 +13,11 @@ use self::cells::{Cells, Marks};
 use self::grid::FaceGrid;
 use self::hidden::{depth_at, hidden_range};
 use crate::limits::Stopped;
-use crate::plan::PlanError;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
 use crate::plan::outline::outer_side::OuterSide;
-use crate::plan::outline::screen_edges::{OutlineView, PX, ScreenEdge};
+use crate::plan::outline::screen_edges::{OutlineView, ScreenEdge};
 use crate::plan::outline::silhouette_edges::SilhouetteEdge;
+use crate::plan::{PX, PlanError};
 use crate::scene::{Fill, MaterialGroups, barycentric_wire};
 use crate::spec::{Layers, OutlineMethod};
 
