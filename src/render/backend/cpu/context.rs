@@ -26,11 +26,18 @@ pub struct RasterContext<'a> {
     pub(super) occlusion: Option<(&'a OcclusionPass, &'a Occlusion)>,
     /// As [`DrawPlan::has_quarters`].
     pub(super) has_quarters: bool,
-    /// As [`CpuRenderer::plain`](super::CpuRenderer::plain).
+    /// See [`is_plain`](Self::is_plain).
     pub(super) is_plain: bool,
 }
 
 impl RasterContext<'_> {
+    /// True if no shortcuts are taken: by the renderer that tests compare with, `CpuRenderer::plain`. Programs are built
+    /// without that feature, and the compiler leaves out what only this renderer runs.
+    #[inline(always)]
+    pub(super) fn is_plain(&self) -> bool {
+        cfg!(feature = "plain") && self.is_plain
+    }
+
     /// Vertex indices of a triangle.
     #[inline(always)]
     pub(super) fn triangle(&self, id: u32) -> [u32; 3] {

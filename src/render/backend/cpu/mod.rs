@@ -86,6 +86,7 @@ impl CpuRenderer {
     /// A renderer without shortcuts, for tests that compare bytes: triangles are set up one by one
     /// and drawn in blocks, nothing is left out behind tiles, each point is shaded by itself, and
     /// each edge is compared with every visible triangle.
+    #[cfg(feature = "plain")]
     pub fn plain(threads: usize) -> Self {
         Self { is_plain: true, ..Self::new(threads) }
     }
@@ -165,7 +166,7 @@ impl CpuRenderer {
         banding.at_once = banding.at_once.min(share.count);
         let drawn = bands::bins::bin(&context, pool, [banding.rows, banding.margin]).map(|bins| {
             lap.end(DrawStage::Sort);
-            if FlatColors::suffice(plan) && !context.is_plain {
+            if FlatColors::suffice(plan) && !context.is_plain() {
                 flat.find(&context, pool, &bins.triangles);
                 context.flat = Some(&flat);
                 lap.end(DrawStage::FaceColors);

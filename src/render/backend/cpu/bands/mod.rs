@@ -206,7 +206,7 @@ fn find_holes(
     }
     holes.reset(samples);
     holes::mark_odd_samples(context.isa, context, samples, holes);
-    if context.is_plain {
+    if context.is_plain() {
         add_holes_plainly(context, pass, triangles, samples, holes);
     } else {
         add_holes(context.isa, context, pass, triangles, samples, holes);
@@ -224,7 +224,7 @@ fn find_points(
     if holes.is_empty() {
         return;
     }
-    if context.is_plain {
+    if context.is_plain() {
         add_points_plainly(context, pass, samples, holes, target);
     } else {
         add_points(context.isa, context, pass, samples, holes, target);
@@ -297,7 +297,7 @@ fn triangles_sampled<const S: usize>(context: &RasterContext<'_>, bins: &Bins, b
             return;
         }
     }
-    if context.is_plain {
+    if context.is_plain() {
         draw_plainly::<S>(context, bins, band, samples, &mut poll);
         return;
     }

@@ -1,4 +1,5 @@
-//! Lines without any shortcut, for tests that compare pictures with those of the fast code.
+//! Lines without any shortcut, for tests that compare pictures with those of the fast code. Programs leave it out: see
+//! [`RasterContext::is_plain`].
 //! Hidden-line removal tests every triangle that is visible along an edge, one by one, and a stroke
 //! is drawn in every pixel around it.
 

@@ -189,7 +189,7 @@ fn fill_kernel(
     let mut poll = DeadlinePoll::new(context.deadline);
     'all: for list in triangles.boxed() {
         for triangle in list.iter() {
-            let Some(added) = lists.add(triangles, triangle, pixels, samples, rows, context.is_plain) else {
+            let Some(added) = lists.add(triangles, triangle, pixels, samples, rows, context.is_plain()) else {
                 lists.end = ListsEnd::Full;
                 break 'all;
             };

@@ -40,7 +40,7 @@ pub fn draw(
         }
     }
     // A surface that shows its wires in layers alone differs from one without layers.
-    let is_shaded = !pass.wires_only && !context.is_plain;
+    let is_shaded = !pass.wires_only && !context.is_plain();
     if is_shaded {
         shade_band(context.isa, context, base, colors);
     }

@@ -25,7 +25,7 @@ fn shade(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32; 4]]
 #[inline(always)]
 fn shade_sampled<const S: usize>(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
     let width = band.size_px[0] as usize;
-    let surface = context.plan.surface.as_ref().filter(|surface| surface.is_shaded && !context.is_plain);
+    let surface = context.plan.surface.as_ref().filter(|surface| surface.is_shaded && !context.is_plain());
     if let Some(surface) = surface {
         shade_together::<S>((context, surface), band, colors);
         return;

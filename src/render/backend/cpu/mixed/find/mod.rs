@@ -145,7 +145,7 @@ fn find_kernel(
     for list in triangles.thin() {
         for face in list.iter() {
             let mut looked_at = 0;
-            if context.is_plain || may_mark(band, face, marks) {
+            if context.is_plain() || may_mark(band, face, marks) {
                 looked_at = mark_thin(context, band, &triangles.get(face.id), &mut pairs, marks);
             }
             // A picture whose deadline has passed is thrown away.
@@ -199,7 +199,7 @@ fn find_breaks(
         let at = band.has(0, y).then(|| band.index(0, y, 0))?;
         Some(band.ids[at..at + band.size_px[0] as usize * band.samples as usize].as_chunks().0)
     };
-    let (Some(own), Some(above), 4, false) = (row(y), row(y - 1), band.samples, context.is_plain) else {
+    let (Some(own), Some(above), 4, false) = (row(y), row(y - 1), band.samples, context.is_plain()) else {
         for (x, out) in (-1..).zip(out) {
             *out = breaks_at(context, band, [x, y], pairs);
         }
