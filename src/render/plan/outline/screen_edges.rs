@@ -26,18 +26,27 @@ pub struct ScreenEdge {
     pub may_show: bool,
 }
 
+/// The way along an edge.
+#[derive(Clone, Copy, Debug)]
+pub struct Way {
+    /// From the first end to the second: a unit vector, or 0 where the length is.
+    pub along: [f64; 2],
+    /// 1/256 px.
+    pub length: f64,
+}
+
 impl ScreenEdge {
     /// The point at a share of the way from the first end to the second.
     pub fn at(&self, share: f64) -> ScreenPoint {
         mix(&self.ends[0], &self.ends[1], share)
     }
 
-    /// Direction and length, 1/256 px; the direction is 0 where the length is.
-    pub fn way(&self) -> ([f64; 2], f64) {
+    /// The way from the first end to the second.
+    pub fn way(&self) -> Way {
         let [a, b] = self.ends;
         let way = [b[0] - a[0], b[1] - a[1]];
         let length = (way[0] * way[0] + way[1] * way[1]).sqrt();
-        (way.map(|v| if length > 0.0 { v / length } else { 0.0 }), length)
+        Way { along: way.map(|v| if length > 0.0 { v / length } else { 0.0 }), length }
     }
 }
 

@@ -10,7 +10,7 @@ use crate::plan::geometry::Geometry;
 use crate::plan::outline::outer_side::OuterSide;
 use crate::plan::outline::parts::{OutlineParts, outlines};
 use crate::plan::outline::round_join::RoundJoins;
-use crate::plan::outline::screen_edges::{OutlineView, ScreenEdge};
+use crate::plan::outline::screen_edges::{OutlineView, ScreenEdge, Way};
 use crate::plan::outline::silhouette_edges::{ScreenMesh, SilhouetteEdge};
 use crate::plan::outline::visible_parts::VisiblePart;
 use crate::plan::outline::{EdgeEnd, HullPass, HullVertex, ScreenPoint};
@@ -114,7 +114,7 @@ impl<'a> OutlineMesh<'a> {
     /// Adds the offset quads beside the visible parts of an edge.
     fn offset_quads(&mut self, edge: &SilhouetteEdge, place: &ScreenEdge, parts: &[VisiblePart]) {
         let Some(side) = OuterSide::of(self.view, edge, place) else { return };
-        let ([a, b], (along, length)) = (place.ends, place.way());
+        let ([a, b], Way { along, length }) = (place.ends, place.way());
         let out = f64::from(edge.free);
         let mut outer = [None; 2];
         for part in parts {

@@ -121,7 +121,7 @@ impl<'a> ScreenMesh<'a> {
         silhouettes: &Silhouettes,
         cx: &mut PlanContext<'_>,
     ) -> Result<Vec<SilhouetteEdge>, PlanError> {
-        select_by("an outline's edges", [self.open_runs.len(), RUNS], cx, |range, found| {
+        select_by("an outline's edges", self.open_runs.len(), RUNS, cx, |range, found| {
             for i in self.open_runs[range].iter().flat_map(|&run| self.runs.edges(run as usize)) {
                 let edge = list.get(i);
                 if self.is_surely_inside(&edge) {

@@ -60,7 +60,7 @@ impl FaceGrid {
         let mesh = view.view.mesh;
         let runs = near_runs(view, marks, cx)?;
         let near = near_faces(view, marks, hides, &runs, cx)?;
-        let faces: Vec<ScreenFace> = select_by("faces near an outline", [runs.len(), RUNS], cx, |range, found| {
+        let faces: Vec<ScreenFace> = select_by("faces near an outline", runs.len(), RUNS, cx, |range, found| {
             for (&run, &near) in runs[range.clone()].iter().zip(&near[range]) {
                 let mut rest = near;
                 while rest != 0 {
