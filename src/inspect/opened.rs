@@ -145,7 +145,7 @@ fn mark_in(
 fn mark_places(image: &mut Image, scene: &Scene<'_, '_>, places: &[Place]) {
     let projector = Projector::new(&Projection::new(&scene.camera, [image.width_px, image.height_px]));
     let middle = [f64::from(image.width_px) / 2.0, f64::from(image.height_px) / 2.0];
-    // The places may be another mesh's, which lies nearer than what the camera was placed for.
+    // A fault that is too near to be drawn is marked all the same, if it lies before the eye.
     let near_w = scene.camera.near.min(1e-3);
     let on_image = |position: &[f64; 3]| -> Option<[f64; 2]> {
         let to_file = &scene.mesh.to_file;
