@@ -38,7 +38,7 @@ pub use error::PlanError;
 pub use framing::framing;
 pub use heat::Legend;
 pub use lines::{Edge, FaceSide, LinePass, Shown};
-pub use outline::{HullPass, HullVertex};
+pub use outline::{HullPass, ScreenVertex};
 pub use peeling::{ALPHA_MIN, PeelingPass, TINTS, pass_mask};
 pub use prepared::{MeshToken, Prepared};
 pub use projection::{PX, Projection, Projector};

@@ -117,7 +117,7 @@ impl CpuRenderer {
         self.vertices.resize(plan.positions.len(), ScreenVertex::default());
         let chunks = plan.positions.chunks(CHUNK).zip(self.vertices.chunks_mut(CHUNK)).collect();
         map(pool, chunks, |(positions, out)| geometry::transform::transform(isa, &plan.projection, positions, out));
-        self.vertices.extend(own.iter().map(ScreenVertex::from));
+        self.vertices.extend_from_slice(own);
     }
 
     fn context<'a>(

@@ -12,7 +12,7 @@ use super::schedule::sizes::{
 };
 use crate::backend::DrawError;
 use crate::image::srgb8_thresholds;
-use crate::plan::{CornerValues, DrawPlan, HullVertex, SurfacePass};
+use crate::plan::{CornerValues, DrawPlan, ScreenVertex, SurfacePass};
 
 /// Supplies the input of transform and visibility, and reserves their output.
 pub fn upload_geometry(
@@ -29,7 +29,7 @@ pub fn upload_geometry(
     let slices = [bytemuck::cast_slice(&plan.triangles), bytemuck::cast_slice(corners)];
     supply(gpu, buffers, Slot::Triangles, triangles, &slices)?;
     let gpu = &gpu.handles;
-    let transformed = plan.positions.len() as u64 * size_of::<HullVertex>() as u64;
+    let transformed = plan.positions.len() as u64 * size_of::<ScreenVertex>() as u64;
     buffers.upload_at(gpu, Slot::Vertices, transformed, bytemuck::cast_slice(own))?;
     if let Some(hull) = &plan.hull {
         buffers.upload(gpu, Slot::HullMaterials, &hull_materials(hull))?;

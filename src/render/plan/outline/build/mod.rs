@@ -13,7 +13,7 @@ use crate::plan::outline::round_join::RoundJoins;
 use crate::plan::outline::screen_edges::{OutlineView, ScreenEdge, Way};
 use crate::plan::outline::silhouette_edges::{ScreenMesh, SilhouetteEdge};
 use crate::plan::outline::visible_parts::VisiblePart;
-use crate::plan::outline::{EdgeEnd, HullPass, HullVertex, ScreenPoint};
+use crate::plan::outline::{EdgeEnd, HullPass, ScreenPoint, ScreenVertex};
 use crate::plan::peeling::needed_pass;
 use crate::plan::shared_slice::SharedSlice;
 use crate::scene::{Scene, Thickness};
@@ -82,7 +82,7 @@ impl<'a> OutlineMesh<'a> {
         // Joins keep both ends, also of edges without a visible part.
         let OutlineParts { edges, places, drawn: visible, .. } = parts;
         let most = edges.len() + visible.len();
-        let bytes = 4 * size_of::<HullVertex>() + 2 * (size_of::<[u32; 3]>() + 4) + 2 * size_of::<EdgeEnd>();
+        let bytes = 4 * size_of::<ScreenVertex>() + 2 * (size_of::<[u32; 3]>() + 4) + 2 * size_of::<EdgeEnd>();
         cx.budget.spend("an outline's strips", most as u64, bytes as u64)?;
         cx.budget.spend("an outline's strips", view.view.mesh.positions.len() as u64 / 8 + 8, 1)?;
         let hull = HullPass {
@@ -171,7 +171,7 @@ impl<'a> OutlineMesh<'a> {
 
     /// A new vertex of the hull.
     fn vertex(&mut self, point: ScreenPoint) -> u32 {
-        self.hull.vertices.push(HullVertex::snapped(point));
+        self.hull.vertices.push(ScreenVertex::snapped(point));
         self.first_vertex + self.hull.vertices.len() as u32 - 1
     }
 }
