@@ -12,7 +12,7 @@ use meshsnap_render::mesh::Mesh;
 use meshsnap_render::pipeline::{
     Context, Drawn, Output, PlanError, RenderError, Stage, Staged, View, draw_cells, draw_view, with_scene,
 };
-use meshsnap_render::plan::{self, Prepared};
+use meshsnap_render::plan::{self, PX, Prepared, Projection, Projector};
 use meshsnap_render::scene::Scene;
 use meshsnap_render::sheet::{self, Cell, Layout};
 use meshsnap_render::spec::{CameraSpec, DebugView, Sheet, SheetViews, Spec};
@@ -143,15 +143,15 @@ fn mark_in(
 
 /// Marks places in a picture of a scene.
 fn mark_places(image: &mut Image, scene: &Scene<'_, '_>, places: &[Place]) {
-    let rows = scene.camera.rows([image.width_px, image.height_px]);
+    let projector = Projector::new(&Projection::new(&scene.camera, [image.width_px, image.height_px]));
     let middle = [f64::from(image.width_px) / 2.0, f64::from(image.height_px) / 2.0];
-    let near = scene.camera.near;
+    // A fault that is too near to be drawn is marked all the same, if it lies before the eye.
+    let near_w = scene.camera.near.min(1e-3);
     let on_image = |position: &[f64; 3]| -> Option<[f64; 2]> {
         let to_file = &scene.mesh.to_file;
         let at: [f64; 3] = std::array::from_fn(|k| (position[k] - to_file.centre[k]) / to_file.scale);
-        let [x, y, _, w] = rows.map(|row| (0..3).map(|k| f64::from(row[k]) * at[k]).sum::<f64>() + f64::from(row[3]));
-        // Beyond the eye nothing is seen.
-        (w > near.min(1e-3) && w.is_finite()).then(|| [middle[0] + x / (256.0 * w), middle[1] + y / (256.0 * w)])
+        let [x, y, _] = projector.on_screen(at, near_w)?;
+        (x.is_finite() && y.is_finite()).then(|| [middle[0] + x / PX, middle[1] + y / PX])
     };
     let marks: Vec<Mark> = places.iter().filter_map(|place| mark(place, on_image)).flatten().collect();
     draw_marks(image, &marks);

@@ -29,8 +29,8 @@ use super::gpu::schedule::sizes::{
 use super::gpu::schedule::{PIECES_MAX, WORKGROUP, line_shares, tiles};
 use super::sample_partition::{GENERATORS, POINTS};
 use crate::plan::{
-    ALPHA_MIN, Edge, HullVertex, LinePass, MIRROR_ROUGHNESS, OutermostSamples, ShadedMaterial, TAPS_PER_PIXEL,
-    TEXTURE_NONE, TINTS, Texture, debug_views, flags, pass_mask, sample_offsets, samplers, slots,
+    ALPHA_MIN, Edge, LinePass, MIRROR_ROUGHNESS, OutermostSamples, ShadedMaterial, TAPS_PER_PIXEL, TEXTURE_NONE, TINTS,
+    Texture, debug_views, flags, pass_mask, sample_offsets, samplers, slots,
 };
 
 /// Every constant that a shader and Rust both have, as the shader calls it.
@@ -275,7 +275,6 @@ fn layouts() -> Vec<(&'static str, Layout)> {
             }),
         ),
         ("Vertex", layout!(ScreenVertex { x y z inv_w })),
-        ("Vertex", layout!(HullVertex { x y z inv_w })),
     ]
 }
 

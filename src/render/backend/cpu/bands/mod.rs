@@ -18,8 +18,9 @@ use self::bins::{Bins, EdgeBin};
 use self::lists::BandLists;
 use self::scratch::BandScratch;
 use self::triangle_bins::TriangleBin;
+use super::context::RasterContext;
 use super::isa::{LANES, dispatch};
-use super::{RasterContext, resolve};
+use super::resolve;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::batch::Batch;
 use crate::backend::cpu::geometry::nearest::Nearest;
@@ -235,7 +236,7 @@ fn find_holes(
     }
     holes.reset(samples);
     holes::mark_odd_samples(context.isa, context, samples, holes);
-    if context.is_plain {
+    if context.is_plain() {
         add_holes_plainly(context, pass, triangles, samples, holes);
     } else {
         add_holes(context.isa, context, pass, triangles, samples, holes);
@@ -253,7 +254,7 @@ fn find_points(
     if holes.is_empty() {
         return;
     }
-    if context.is_plain {
+    if context.is_plain() {
         add_points_plainly(context, pass, samples, holes, target);
     } else {
         add_points(context.isa, context, pass, samples, holes, target);
@@ -326,7 +327,7 @@ fn triangles_sampled<const S: usize>(context: &RasterContext<'_>, bins: &Bins, b
             return;
         }
     }
-    if context.is_plain {
+    if context.is_plain() {
         draw_plainly::<S>(context, bins, band, samples, &mut poll);
         return;
     }

@@ -8,8 +8,8 @@ use super::setups::{Boxes, Corners, Setups, class, lane_offsets};
 use super::tiles::Tiles;
 use super::visibility;
 use super::visibility::{Parts, Setup};
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::BoxedFace;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::isa::{Isa, LANES};
 
 /// Triangles in a batch. Triangles of equal size are drawn one after the other, so that the

@@ -11,7 +11,7 @@ use super::samples::{SampleBand, SampleGrid};
 use super::setups::{Boxes, EXTENT_MAX, SHORT_MAX, SIZES, Setups, class, lane_offsets};
 use super::transform::ScreenVertex;
 use super::visibility::Parts;
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::isa::LANES;
 use crate::plan::sample_offsets;
 

@@ -6,7 +6,7 @@
 use super::samples::{SampleBand, SampleGrid};
 use super::transform::recip;
 use super::visibility::Parts;
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::isa::LANES;
 use crate::plan::sample_offsets;
 

@@ -10,6 +10,7 @@ pub(crate) mod debug;
 pub(crate) mod flat;
 #[cfg(target_arch = "x86_64")]
 mod flat_avx2;
+pub(crate) mod flat_colors;
 pub(crate) mod light;
 pub(crate) mod normal;
 mod occlusion_texture;

@@ -94,7 +94,7 @@ fn runs_tell_what_their_faces_would() {
         let scene = Scene::new(&mesh, &spec, &mut budget).unwrap();
         let mut cx = PlanContext::new(&mut budget, &deadline, &[]);
         let view = ScreenMesh::new(&scene, &mut cx).unwrap();
-        let places = Places { mesh: &mesh, rows: view.rows, rounded: 0.0 };
+        let places = Places { mesh: &mesh, projector: view.projector, rounded: 0.0 };
         for (r, run) in view.runs.runs.iter().enumerate() {
             let side = view.run_view.side(run);
             (sure, all) = (sure + usize::from(side != 0), all + 1);

@@ -5,8 +5,8 @@
 use std::arch::x86_64::*;
 
 use super::{Bounds, Kept, Sides, TrianglePass, area_of};
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::{BoxedFace, KeptFaces};
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::batch_avx2::{Corners, bits, load, pixels, to_ints, transposed};
 use crate::backend::cpu::geometry::setups::EXTENT_MAX;
 use crate::backend::cpu::geometry::transform::OUTSIDE;

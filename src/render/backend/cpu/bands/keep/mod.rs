@@ -6,8 +6,8 @@ mod avx2;
 
 use std::ops::Range;
 
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::{BoxedFace, KeptFaces, pair};
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleGrid;
 use crate::backend::cpu::geometry::setups::Corners;
 use crate::backend::cpu::geometry::transform::{OUTSIDE, ScreenVertex};

@@ -8,7 +8,7 @@
 use std::arch::x86_64::*;
 
 use super::{HOLE_UNIT, Inset, Insets, LEVEL_PX, NARROW_PX};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::batch_avx2::{from_floats, load_corners, recip, to_floats, to_ints, to_words};
 use crate::backend::cpu::isa::LANES;
 
