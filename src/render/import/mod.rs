@@ -45,6 +45,7 @@ use bundle::{entry, unzip};
 
 /// The mesh formats that are read. The table in `formats` has a row for each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Format {
     /// Wavefront OBJ.

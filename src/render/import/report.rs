@@ -5,6 +5,7 @@ use crate::warning::Warning;
 
 /// Counts, repairs and warnings of one import, and the file's metadata. `inspect` prints them.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct ImportReport {
     /// Format that was read.
     pub format: Format,
@@ -55,6 +56,7 @@ pub fn counted_warnings<const N: usize>(kinds: [(u64, &'static str, &str); N]) -
 
 /// Totals of a file's meshes, as its own accessors count them, each mesh once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct FileContent {
     /// Primitives: parts of a mesh with one material each.
     pub draw_calls: u64,
@@ -70,6 +72,7 @@ pub struct FileContent {
 
 /// Metadata of a file. Counts are None where the format has no such thing.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct FileMetadata {
     /// The program that wrote the file, or the text of its first comment or header.
     pub generator: Option<String>,

@@ -112,6 +112,7 @@ impl Default for ToFile {
 
 /// The axis that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub enum UpAxis {
     /// +X.
     X,

@@ -1,9 +1,7 @@
 //! Unpacks views that meshoptimizer has packed in another process: many views in one order, because each order costs a
 //! process.
 
-use serde::{Deserialize, Serialize};
-
-use super::meshopt::{DECODER, Mode, Packed, Unpacked, unpack};
+use super::meshopt::{DECODER, Packed, Unpacked, unpack};
 use crate::guard::{Panicked, guarded};
 use crate::import::isolate::{self, Isolation, Order};
 use crate::import::{MeshError, MeshFault};
@@ -15,18 +13,10 @@ pub const AHEAD_BYTES_MAX: u64 = 64 << 20;
 const BESIDE_BYTES: u64 = 1 << 20;
 
 /// One view: what it holds, and how many bytes of the file are its own.
-#[derive(Serialize, Deserialize)]
-struct Part {
-    mode: u8,
-    count: u64,
-    stride: u64,
-    packed_bytes: u64,
-}
+type Part = (Packed, u64);
 
 /// [`Unpacked`] as it is sent.
 type Answer = Result<Option<Vec<u8>>, ()>;
-
-const MODES: [Mode; 3] = [Mode::Attributes, Mode::Triangles, Mode::Indices];
 
 /// Unpacks views in the other process.
 pub fn read(
@@ -34,13 +24,7 @@ pub fn read(
     isolation: &dyn Isolation,
     (budget, deadline): (&Budget, &Deadline),
 ) -> Result<Vec<Unpacked>, MeshError> {
-    let part = |&(Packed { mode, count, stride }, bytes): &(Packed, &[u8])| Part {
-        mode: MODES.iter().position(|&one| one == mode).unwrap_or_default() as u8,
-        count: count as u64,
-        stride,
-        packed_bytes: bytes.len() as u64,
-    };
-    let parts: Vec<Part> = views.iter().map(part).collect();
+    let parts: Vec<Part> = views.iter().map(|(packed, bytes)| (*packed, bytes.len() as u64)).collect();
     let foul = || MeshError::new(MeshFault::DecoderCrashed, "the decoder of this format answered with nonsense");
     let mut head = vec![isolate::MESHOPT];
     head.extend(postcard::to_stdvec(&parts).map_err(|_| foul())?);
@@ -65,13 +49,10 @@ pub fn answer(head: &[u8], file: &[u8]) -> Vec<u8> {
     let parts: Vec<Part> = postcard::from_bytes(head).unwrap_or_default();
     let mut rest = file;
     let mut all: Vec<Answer> = Vec::with_capacity(parts.len());
-    for part in parts {
-        let (bytes, after) = rest.split_at_checked(part.packed_bytes as usize).unwrap_or((rest, &[]));
+    for (packed, packed_bytes) in parts {
+        let (bytes, after) = rest.split_at_checked(packed_bytes as usize).unwrap_or((rest, &[]));
         rest = after;
-        let mode = MODES.get(usize::from(part.mode)).copied();
-        let unpack =
-            || mode.and_then(|mode| unpack(Packed { mode, count: part.count as usize, stride: part.stride }, bytes));
-        all.push(guarded(DECODER, unpack).map_err(drop));
+        all.push(guarded(DECODER, || unpack(packed, bytes)).map_err(drop));
     }
     postcard::to_stdvec(&all).unwrap_or_default()
 }
