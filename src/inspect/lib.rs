@@ -6,6 +6,7 @@
 pub mod check;
 pub mod diff;
 pub mod geometry;
+mod images;
 #[cfg(test)]
 mod made_obj;
 pub mod opened;

@@ -5,6 +5,7 @@ use std::rc::Rc;
 use super::places::{self, Faults};
 use super::{ALL_PLACES_MAX, Check, Figure, Level, Options, PLACES_MAX, Place, Rule, RuleSet, polygons, uvs, volume};
 use crate::geometry::intersections;
+use crate::images::checked_header;
 use crate::report::Bounds;
 use meshsnap_render::import::{ImportReport, MeshError, MeshFault};
 use meshsnap_render::limits::{Budget, Deadline};
@@ -222,7 +223,7 @@ impl Judge<'_> {
     fn warnings(&self) -> Finding {
         let images = self.subject.mesh.images.iter();
         let fault = |image: &ImageSource| match &image.content {
-            ImageContent::Encoded(bytes) => decode::check(&image.name, bytes).err(),
+            ImageContent::Encoded(bytes) => checked_header(&image.name, bytes).err(),
             ImageContent::Absent => None,
         };
         let faults: Vec<_> = images.filter_map(fault).collect();

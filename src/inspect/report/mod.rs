@@ -19,6 +19,7 @@ pub use self::print::PrintReport;
 pub use self::topology::TopologyReport;
 use crate::geometry::intersections;
 use crate::geometry::measure::Measures;
+use crate::images::checked_header;
 use meshsnap_render::import::{self, Bundle, FileContent, FileMetadata, ImportReport, Imported, MeshError};
 use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_render::mesh::edges::EdgeList;
@@ -26,7 +27,7 @@ use meshsnap_render::mesh::material::{FileLens, ImageContent, ImageSource};
 use meshsnap_render::mesh::topology::Topology;
 use meshsnap_render::mesh::{Mesh, UpAxis};
 use meshsnap_render::pipeline::Stage;
-use meshsnap_render::texture::{TextureError, decode, fault_warnings};
+use meshsnap_render::texture::{TextureError, fault_warnings};
 use serde::Serialize;
 
 /// Reports what is in a file.
@@ -286,7 +287,7 @@ fn texture(image: &ImageSource) -> (TextureReport, Option<TextureError>) {
     let none = TextureReport { name, format: None, width_px: None, height_px: None, file_bytes: None };
     let ImageContent::Encoded(bytes) = &image.content else { return (none, None) };
     let file_bytes = Some(bytes.len() as u64);
-    match decode::check(&image.name, bytes) {
+    match checked_header(&image.name, bytes) {
         Ok(header) => {
             let [width_px, height_px] = [header.width, header.height].map(Some);
             (TextureReport { format: Some(header.encoding_name()), width_px, height_px, file_bytes, ..none }, None)

@@ -220,7 +220,7 @@ fn name(text: &[u8], newline: u8) -> &[u8] {
 }
 
 fn parse(word: Option<&[u8]>) -> Option<f64> {
-    std::str::from_utf8(word?).ok()?.parse().ok()
+    text::number(word?)
 }
 
 fn bad_line(index: usize, what: &str) -> MeshError {
