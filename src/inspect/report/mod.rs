@@ -20,7 +20,7 @@ pub use self::topology::TopologyReport;
 use crate::geometry::intersections;
 use crate::geometry::measure::Measures;
 use crate::images::checked_header;
-use meshsnap_render::import::{self, Bundle, FileContent, FileMetadata, ImportReport, Imported, MeshError};
+use meshsnap_render::import::{self, Bundle, FileContent, FileMetadata, ImportReport, MeshError};
 use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_render::mesh::edges::EdgeList;
 use meshsnap_render::mesh::material::{FileLens, ImageContent, ImageSource};
@@ -40,9 +40,9 @@ pub fn inspect(
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Report, MeshError> {
-    let Imported { mesh, report, .. } = import::import(bundle, options, limits, budget, deadline)?;
+    let (mesh, report) = import::import(bundle, options, limits, budget, deadline)?;
     ended(Stage::Parse);
-    Report::of(&mesh, &report, bundle.bytes_len(), extras, budget, deadline)
+    Report::of(&mesh, &report, extras, budget, deadline)
 }
 
 /// The contents of a file. Counts are null where the format has no such thing.
@@ -165,11 +165,10 @@ struct WarningReport {
 }
 
 impl Report {
-    /// On a mesh and its import, which were read from `file_bytes` bytes.
+    /// On a mesh and its import.
     pub fn of(
         mesh: &Mesh,
         import: &ImportReport,
-        file_bytes: u64,
         extras: Extras,
         budget: &mut Budget,
         deadline: &Deadline,
@@ -191,7 +190,7 @@ impl Report {
         let print = extras.print.then(|| PrintReport::of(mesh, &mut budget.clone(), deadline)).transpose()?;
         let parts = extras.parts.then(|| PartsReport::of(mesh, budget, deadline)).transpose()?;
         let uv = extras.uv.then(|| ChartsReport::of(mesh, budget, deadline)).transpose()?;
-        Ok(Self { print, parts, uv, ..Self::new(mesh, import, file_bytes, (topology, t_junctions)) })
+        Ok(Self { print, parts, uv, ..Self::new(mesh, import, (topology, t_junctions)) })
     }
 
     /// The report as JSON, byte for byte as `inspect --json` prints it and HTTP answers.
@@ -209,12 +208,7 @@ impl Report {
         text::text(self) + &more.into_iter().flatten().collect::<String>()
     }
 
-    fn new(
-        mesh: &Mesh,
-        import: &ImportReport,
-        file_bytes: u64,
-        (topology, t_junctions): (Topology, Option<u64>),
-    ) -> Self {
+    fn new(mesh: &Mesh, import: &ImportReport, (topology, t_junctions): (Topology, Option<u64>)) -> Self {
         let FileMetadata {
             generator,
             scenes,
@@ -236,7 +230,7 @@ impl Report {
         Self {
             format: import.format.name(),
             generator,
-            file_bytes,
+            file_bytes: import.file_bytes,
             up: up(mesh.up),
             scenes,
             nodes,

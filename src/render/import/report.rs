@@ -9,6 +9,10 @@ use crate::warning::Warning;
 pub struct ImportReport {
     /// Format that was read.
     pub format: Format,
+    /// The path of the mesh in its bundle.
+    pub path: String,
+    /// Bytes of all files of the bundle.
+    pub file_bytes: u64,
     /// Vertices in the file, before welding.
     pub file_vertices: u64,
     /// Totals of the file's meshes, shown or not, each counted once. None for all formats but glTF,
@@ -39,6 +43,15 @@ pub struct ImportReport {
 }
 
 impl ImportReport {
+    /// Memory of its lists and texts, bytes.
+    pub fn bytes(&self) -> u64 {
+        let FileMetadata { generator, extensions_used, extensions_required, .. } = &self.metadata;
+        let texts = extensions_used.iter().chain(extensions_required).chain(generator);
+        let of_texts = texts.map(|text| size_of::<String>() + text.len()).sum::<usize>() + self.path.len();
+        let of_warnings = self.warnings.iter().map(Warning::bytes).sum::<usize>();
+        (of_texts + of_warnings + size_of_val(&self.degenerate_places[..])) as u64
+    }
+
     /// Adds loose vertices of a part of the file, if they were counted.
     pub fn add_loose(&mut self, count: Option<u64>) {
         if let Some(count) = count {

@@ -286,7 +286,7 @@ mod tests {
             counts_loose: false,
         };
         let raw = read(file, &Changed(Box::new(change)), &mut cx)?;
-        normalise(raw, &mut cx).map(|imported| imported.mesh.triangles.len())
+        normalise(raw, &mut cx).map(|(mesh, _)| mesh.triangles.len())
     }
 
     #[test]

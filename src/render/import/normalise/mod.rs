@@ -20,7 +20,7 @@ use self::geometry::{Geometry, Indexed};
 use self::number::{Numbered, is_collapsed, number};
 use self::pow2::{Pow2, exponent, is_usable, max_abs};
 use super::raw::RawMesh;
-use super::{ImportReport, Imported, MeshError, MeshFault};
+use super::{ImportReport, MeshError, MeshFault};
 use crate::import::context::Context;
 use crate::limits::Stopped;
 use crate::mesh::vector::sub;
@@ -29,7 +29,7 @@ use crate::parallel::{map, map_items};
 use crate::pluralise::pluralise;
 
 /// Brings an imported mesh into its normal form.
-pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, MeshError> {
+pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<(Mesh, ImportReport), MeshError> {
     let mut soup = raw.soup.take();
     let [triangle_count, vertex_count] = match &soup {
         Some(soup) => [soup.triangles(), 3 * soup.triangles()],
@@ -91,7 +91,7 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     }
     (mesh.images, mesh.cameras) = (raw.images, raw.cameras);
     mesh.up = raw.up;
-    Ok(Imported { mesh, report: raw.report, path: cx.bundle.entry().path.clone() })
+    Ok((mesh, raw.report))
 }
 
 /// Positions, triangles, normals, lines and bounds of the mesh, and the triangle of each face
