@@ -125,7 +125,7 @@ fn shape<G: Geometry>(
         return Err(empty(&raw.report));
     }
     let unit_box = UnitBox::around(faces.bounds.union(around_lines).scaled(down));
-    let (mut mesh, kept) = weld(geometry, faces, (down, &unit_box), raw, cx)?;
+    let (mut mesh, kept) = weld(geometry, faces, down, &unit_box, raw, cx)?;
     if mesh.triangles.is_empty() && mesh.lines_and_points.is_empty() {
         return Err(empty(&raw.report));
     }
@@ -195,7 +195,8 @@ impl UnitBox {
 fn weld<G: Geometry>(
     geometry: &mut G,
     mut faces: Faces<G::Key>,
-    (down, unit_box): (Pow2, &UnitBox),
+    down: Pow2,
+    unit_box: &UnitBox,
     raw: &mut RawMesh,
     cx: &Context<'_>,
 ) -> Result<(Mesh, Option<Vec<u32>>), Stopped> {
@@ -203,7 +204,7 @@ fn weld<G: Geometry>(
     let ends = raw.lines_and_points.iter().map(|one| one.ends);
     let has_attributes = raw.has_attributes();
     let Numbered { positions, mut triangles, ends, collapsed } =
-        number(geometry, &mut faces, ends, position, (has_attributes, cx.deadline))?;
+        number(geometry, &mut faces, ends, position, has_attributes, cx.deadline)?;
     raw.report.dropped_collapsed_faces = collapsed;
     if collapsed > 0 {
         let left: Vec<usize> = (0..triangles.len()).filter(|&face| !is_collapsed(&triangles[face])).collect();

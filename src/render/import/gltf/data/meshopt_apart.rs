@@ -3,9 +3,9 @@
 
 use super::meshopt::{DECODER, Packed, Unpacked, unpack};
 use crate::guard::{Panicked, guarded};
+use crate::import::context::Context;
 use crate::import::isolate::{self, Isolation, Order};
 use crate::import::{MeshError, MeshFault};
-use crate::limits::{Budget, Deadline};
 
 /// Most unpacked bytes of views that are unpacked before they are asked for.
 pub const AHEAD_BYTES_MAX: u64 = 64 << 20;
@@ -22,7 +22,7 @@ type Answer = Result<Option<Vec<u8>>, ()>;
 pub fn read(
     views: &[(Packed, &[u8])],
     isolation: &dyn Isolation,
-    (budget, deadline): (&Budget, &Deadline),
+    cx: &Context<'_>,
 ) -> Result<Vec<Unpacked>, MeshError> {
     let parts: Vec<Part> = views.iter().map(|(packed, bytes)| (*packed, bytes.len() as u64)).collect();
     let foul = || MeshError::new(MeshFault::DecoderCrashed, "the decoder of this format answered with nonsense");
@@ -31,8 +31,8 @@ pub fn read(
     let file = views.iter().map(|(_, bytes)| *bytes).collect::<Vec<_>>().concat();
     let unpacked_bytes = views.iter().map(|(packed, _)| packed.bytes()).fold(0, u64::saturating_add);
     let memory_bytes = unpacked_bytes.saturating_mul(3).saturating_add(BESIDE_BYTES);
-    let lend = |bytes| budget.lend_beside(bytes);
-    let answer = isolation.decode(&Order { head: &head, file: &file, memory_bytes, lend: &lend }, deadline)?;
+    let lend = |bytes| cx.budget.lend_beside(bytes);
+    let answer = isolation.decode(&Order { head: &head, file: &file, memory_bytes, lend: &lend }, cx.deadline)?;
     let all: Vec<Answer> = postcard::from_bytes(&answer).map_err(|_| foul())?;
     let fits = |one: &Answer, packed: &Packed| match one {
         Ok(Some(bytes)) => bytes.len() as u64 == packed.bytes(),
