@@ -15,7 +15,7 @@ use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes, Render
 use crate::caption::{Scale, draw_legend};
 use crate::encode::{self, EncodeError};
 use crate::image::{Image, ImageFormat, LinearImage, RowSink};
-use crate::import::{self, Bundle, Format, Imported, MeshError};
+use crate::import::{self, Bundle, Format, ImportReport, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
 use crate::plan::{self, DrawPlan, Prepared, Skip, UvLayout};
@@ -40,16 +40,16 @@ pub struct Context<'a> {
 /// Turns the bytes of a mesh into the bytes of a picture.
 ///
 /// `limits` are those of the file; the memory that is left is the context's.
-pub fn render(job: Job<'_>, limits: &Limits, mut cx: Context<'_>) -> Result<Output, RenderError> {
+pub fn render(job: Job<'_>, limits: &Limits, cx: Context<'_>) -> Result<Output, RenderError> {
     // Bytes -> Mesh
     let Job { bundle, format_in, spec } = job;
     let options = import::Options { format: format_in, time_s: spec.time_s, ..import::Options::default() };
-    let model = Model::read(&bundle, options, limits, &mut cx.budget, cx.deadline)?;
+    let model = Model::read(&bundle, options, limits, cx.budget, cx.deadline)?;
     // The files' memory is free for drawing, unless the caller holds them, too.
     drop(bundle);
     (cx.ended)(Stage::Parse);
 
-    render_model(&model, spec, cx)
+    render_model(&model, spec, Context { budget: model.budget.clone(), ..cx })
 }
 
 /// Turns a mesh that is in memory already into the bytes of a picture.
@@ -77,7 +77,7 @@ pub fn render_model(model: &Model, spec: &Spec, mut cx: Context<'_>) -> Result<O
     };
     (cx.ended)(Stage::Encode);
 
-    let mut warnings = [model.warnings.clone(), report.warnings].concat();
+    let mut warnings = [model.report.warnings.clone(), report.warnings].concat();
     if spec.camera.has_own_up() {
         warnings.retain(|warning| warning.code != import::up_axis::CODE);
     }
@@ -283,15 +283,14 @@ pub fn with_plan(
     })
 }
 
-/// A mesh in memory: imported once, and drawn as often as wanted. What one picture finds out about
+/// A mesh in memory: imported once, and drawn, judged and compared as often as wanted. What one picture finds out about
 /// it, such as its edges, serves the next.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Model {
-    /// The mesh.
     mesh: Mesh,
-    /// Faults of the file that were tolerated.
-    warnings: Vec<Warning>,
+    report: ImportReport,
     prepared: Prepared,
+    budget: Budget,
 }
 
 /// A mesh as it is drawn.
@@ -306,16 +305,16 @@ pub struct View<'a> {
 }
 
 impl Model {
-    /// Reads a file.
+    /// Reads a file, which takes its memory from the budget. The rest is for what is done with the mesh.
     pub fn read(
         bundle: &Bundle,
         options: impl Into<import::Options>,
         limits: &Limits,
-        budget: &mut Budget,
+        mut budget: Budget,
         deadline: &Deadline,
     ) -> Result<Self, MeshError> {
-        let Imported { mesh, report, .. } = import::import(bundle, options, limits, budget, deadline)?;
-        Ok(Self { mesh, warnings: report.warnings, prepared: Prepared::default() })
+        let (mesh, report) = import::import(bundle, options, limits, &mut budget, deadline)?;
+        Ok(Self { mesh, report, prepared: Prepared::default(), budget })
     }
 
     /// The mesh.
@@ -323,20 +322,39 @@ impl Model {
         &self.mesh
     }
 
+    /// The report on its file.
+    pub fn report(&self) -> &ImportReport {
+        &self.report
+    }
+
     /// The mesh as it is drawn, with the camera fitted to it.
     pub fn view(&self) -> View<'_> {
         View { mesh: &self.mesh, prepared: &self.prepared, framing: None }
     }
 
-    /// Faults of the file that were tolerated.
-    pub fn warnings(&self) -> &[Warning] {
-        &self.warnings
+    /// The job's budget after reading it.
+    pub fn budget(&self) -> &Budget {
+        &self.budget
+    }
+
+    /// The job's budget after reading it and another mesh, if there is one.
+    pub fn budget_beside(&self, other: Option<&Self>) -> Result<Budget, MeshError> {
+        let mut budget = self.budget.clone();
+        if let Some(other) = other {
+            budget.spend("the other mesh", other.budget.spent_bytes(), 1)?;
+        }
+        Ok(budget)
+    }
+
+    /// The same with a budget that borrows from no lender, for a mesh that outlives its job.
+    #[must_use]
+    pub fn without_lender(self) -> Self {
+        Self { budget: self.budget.lent_by(None, 0), ..self }
     }
 
     /// Memory that it takes, with what pictures have found out so far, bytes.
     pub fn bytes(&self) -> u64 {
-        let warnings = self.warnings.iter().map(Warning::bytes).sum::<usize>();
-        size_of::<Self>() as u64 + self.mesh.bytes() + self.prepared.bytes() + warnings as u64
+        size_of::<Self>() as u64 + self.mesh.bytes() + self.report.bytes() + self.prepared.bytes()
     }
 }
 

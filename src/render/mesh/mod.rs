@@ -113,6 +113,7 @@ impl Default for ToFile {
 /// The axis that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub enum UpAxis {
     /// +X.
     X,

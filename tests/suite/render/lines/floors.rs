@@ -191,7 +191,7 @@ fn what_is_painted_on_a_sheet_is_seen_from_both_sides() {
     let mut cases = 0;
     for eye in [[2.0, 3.0, 4.0], [2.0, -3.0, 4.0]] {
         let spec = spec(&keys, floor, eye, "perspective");
-        let seen = differing(&draw(&painted, &spec), &draw(&obj, &spec));
+        let seen = differing(&draw(&painted, &spec, cases), &draw(&obj, &spec, cases));
         assert!(seen > 80, "{eye:?}: {seen} pixels show the line and the point");
         cases += 1;
     }

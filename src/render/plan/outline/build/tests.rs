@@ -19,7 +19,7 @@ fn triangles(count: usize) -> Mesh {
     }
     let limits = Limits::default();
     let bundle = Bundle::of_one(obj.into_bytes());
-    import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap().mesh
+    import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap().0
 }
 
 fn canvas(scene: &Scene<'_, '_>) -> Canvas {
