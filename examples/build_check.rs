@@ -4,8 +4,7 @@
 
 use std::error::Error;
 
-use meshsnap_inspect::check::{Options, RuleSet};
-use meshsnap_inspect::opened;
+use meshsnap_inspect::check::{Options, RuleSet, check};
 use meshsnap_render::import::Bundle;
 use meshsnap_render::limits::{Budget, Deadline, Limits};
 
@@ -15,9 +14,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     for path in std::env::args().skip(1) {
         println!("cargo:rerun-if-changed={path}");
         let (limits, deadline) = (Limits::default(), Deadline::default());
-        let opened =
-            opened::open(&Bundle::of_one(std::fs::read(&path)?), None, &limits, Budget::new(&limits), &deadline)?;
-        for check in opened.check(&rules, Options::default(), &deadline)?.iter().filter(|check| !check.ok) {
+        let model = meshsnap_inspect::read(
+            &Bundle::of_one(std::fs::read(&path)?),
+            None,
+            &limits,
+            Budget::new(&limits),
+            &deadline,
+        )?;
+        for check in check(&model, &rules, Options::default(), &deadline)?.iter().filter(|check| !check.ok) {
             println!("cargo:warning={path}: {}: {}", check.rule, check.detail);
             failed += usize::from(check.fails());
         }

@@ -1,6 +1,5 @@
 // Every stage: the uniforms' types, shared constants, and arithmetic that gives the CPU's bits
-// (docs/rasterizer.md, "Rounded operations"). Prepended to each stage by
-// src/render/backend/gpu/pipelines/mod.rs.
+// (docs/rasterizer.md, "Rounded operations").
 //
 // Uses: one_job.wgsl or gang.wgsl (batch, frame).
 

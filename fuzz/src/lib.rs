@@ -5,7 +5,7 @@
 
 use meshsnap_inspect::report::{Extras, Report};
 use meshsnap_render::backend::{Backends, GpuHost, HardwareHint};
-use meshsnap_render::import::{Bundle, BundleFile, Format, ImportReport, Imported, MeshError, Options, import};
+use meshsnap_render::import::{Bundle, BundleFile, Format, ImportReport, MeshError, Options, import};
 use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_render::mesh::Mesh;
 use meshsnap_render::mesh::material::{AlphaMode, FileLens};
@@ -40,13 +40,13 @@ pub fn run(target: &str, bytes: &[u8]) {
 }
 
 /// The result of a target's importer, in the rest pose. None for targets that take more than a mesh.
-pub fn imported(target: &str, bytes: &[u8]) -> Option<Result<Imported, MeshError>> {
+pub fn imported(target: &str, bytes: &[u8]) -> Option<Result<Mesh, MeshError>> {
     if matches!(target, "request" | "pipeline") {
         return None;
     }
     let (bundle, format) = bundle(target, bytes);
     let limits = limits();
-    Some(import(&bundle, format, &limits, &mut Budget::new(&limits), &Deadline::default()))
+    Some(import(&bundle, format, &limits, &mut Budget::new(&limits), &Deadline::default()).map(|(mesh, _)| mesh))
 }
 
 fn bundle(target: &str, bytes: &[u8]) -> (Bundle, Option<Format>) {
@@ -94,10 +94,10 @@ fn run_import(bundle: &Bundle, options: Options) {
     let limits = limits();
     let mut budget = Budget::new(&limits);
     match import(bundle, options, &limits, &mut budget, &Deadline::default()) {
-        Ok(Imported { mesh, report: import, .. }) => {
+        Ok((mesh, import)) => {
             check(&mesh, &import);
             let extras = Extras { print: true, parts: true, uv: true };
-            let report = Report::of(&mesh, &import, bundle.bytes_len(), extras, &mut budget, &Deadline::default());
+            let report = Report::of(&mesh, &import, extras, &mut budget, &Deadline::default());
             let Ok(report) = report else { return };
             assert!(!report.text().is_empty());
             serde_json::to_vec(&report).expect("a report is JSON");

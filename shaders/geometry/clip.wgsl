@@ -3,9 +3,10 @@
 // src/render/backend/cpu/geometry/clip.rs.
 //
 // Uses: common.wgsl (homogeneous, WORKGROUP), one_job.wgsl (batch), geometry/corners.wgsl (Corners,
-// is_outside, is_peeling_done, screen_triangle, triangles), geometry/culling.wgsl (passes_culling),
+// is_outside, screen_triangle, triangles), geometry/culling.wgsl (passes_culling),
 // geometry/planes.wgsl (intersect, is_moderate, plane_distance, snap_clipped),
-// geometry/triangle.wgsl (area_of, pixel_bounds, setup_of), geometry/work.wgsl (append_work_item).
+// geometry/triangle.wgsl (area_of, pixel_bounds, setup_of), geometry/work.wgsl (append_work_item),
+// peeling/rounds.wgsl (is_peeling_done).
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 

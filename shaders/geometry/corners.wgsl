@@ -1,12 +1,9 @@
 // Stage visibility: a triangle of the plan by its number.
 //
-// Uses: common.wgsl (has, OUTSIDE, PEELING, Vertex), one_job.wgsl or gang.wgsl (batch, frame).
+// Uses: common.wgsl (OUTSIDE, Vertex), one_job.wgsl or gang.wgsl (frame).
 
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
 @group(1) @binding(3) var<storage, read> vertices: array<Vertex>;
-
-// Per layer: 1 if there may be another behind it.
-@group(1) @binding(28) var<storage, read> peel_rounds: array<u32>;
 
 struct Corners {
     a: Vertex,
@@ -24,9 +21,4 @@ fn screen_triangle(t: u32) -> Corners {
 
 fn is_outside(v: Corners) -> bool {
     return v.a.x == OUTSIDE || v.b.x == OUTSIDE || v.c.x == OUTSIDE;
-}
-
-// True if the previous round of depth peeling has left nothing to find.
-fn is_peeling_done() -> bool {
-    return has(PEELING) && batch.layer > 0u && peel_rounds[batch.layer - 1u] == 0u;
 }

@@ -3,11 +3,6 @@
 // Uses: common.wgsl (sample_corner, sample_count, sample_step), geometry/triangle.wgsl (depth_at,
 // edges_of, Setup), peeling/emit_layer.wgsl or samples/emit.wgsl (emit).
 
-// True if triangles are drawn at all.
-fn is_any_wanted() -> bool {
-    return true;
-}
-
 fn draw_small(s: Setup, bounds: vec4<i32>, id: u32) {
     let e = edges_of(s);
     let corner = sample_corner(bounds.xy);

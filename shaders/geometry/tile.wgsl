@@ -3,8 +3,8 @@
 // pixel. Shared by visibility_tile.wgsl and visibility_few.wgsl. What a pixel's thread does is in tile_samples.wgsl
 // or, for mixed pixels, in mixed/lists.wgsl. No twin: the CPU has one loop for all sizes.
 //
-// Uses: common.wgsl (mul_wide, sample_corner, sub_wide, WORKGROUP), geometry/tile_samples.wgsl or
-// mixed/lists.wgsl or mixed/points.wgsl (draw_pixel), geometry/triangle.wgsl (Edges, edges_of,
+// Uses: common.wgsl (mul_wide, sub_wide, WORKGROUP), geometry/tile_samples.wgsl or mixed/lists.wgsl
+// or mixed/points.wgsl (block_corner, draw_pixel), geometry/triangle.wgsl (Edges, edges_of,
 // pixel_bounds, Setup).
 
 // Pixels along a side of a tile.
@@ -31,7 +31,7 @@ fn draw_tile(s: Setup, e: Edges, bounds: vec4<i32>, tile: vec2<i32>, thread: i32
     workgroupBarrier();
     let block = tile + 8 * vec2(thread & 7, thread >> 3u);
     if all(block <= bounds.zw) {
-        let values = edge_values(s, e, sample_corner(block));
+        let values = edge_values(s, e, block_corner(block));
         // No edge function is larger anywhere in the block.
         let most = values + max(e.dx, vec3(0)) * 128 + max(-e.dy, vec3(0)) * 128;
         if (most.x | most.y | most.z) >= 0 {
@@ -52,7 +52,7 @@ fn draw_tile(s: Setup, e: Edges, bounds: vec4<i32>, tile: vec2<i32>, thread: i32
     workgroupBarrier();
 }
 
-// Edge values in sixteenths at a pixel's sample corner, exact for the 8 x 8 pixels from there.
+// Edge values in sixteenths at a pixel's corner, exact for the 8 x 8 pixels from there.
 fn edge_values(s: Setup, e: Edges, corner: vec2<i32>) -> vec3<i32> {
     return vec3(
         edge_value(e.dx.x, e.dy.x, e.bias.x, corner - vec2(s.x.x, s.y.x)),

@@ -3,6 +3,11 @@
 // Uses: common.wgsl (sample_corner, sample_count, sample_step), geometry/triangle.wgsl (depth_at,
 // Edges, Setup), peeling/emit_layer.wgsl or samples/emit.wgsl (emit).
 
+// Corner of a block, given its first pixel.
+fn block_corner(pixel: vec2<i32>) -> vec2<i32> {
+    return sample_corner(pixel);
+}
+
 fn draw_pixel(s: Setup, e: Edges, values: vec3<i32>, in_block: vec2<i32>, pixel: vec2<i32>, id: u32) {
     let corner = sample_corner(pixel);
     for (var n = 0; n < sample_count(); n++) {

@@ -4,16 +4,16 @@
 // A thread draws a small triangle itself; larger ones go to the work list for visibility_tile.wgsl.
 //
 // Uses: common.wgsl (WORKGROUP), one_job.wgsl or gang.wgsl (batch, begin_job),
-// geometry/corners.wgsl (is_outside, is_peeling_done, screen_triangle), geometry/culling.wgsl
-// (passes_culling), geometry/small.wgsl or mixed/lists.wgsl or mixed/points.wgsl (draw_small,
-// is_any_wanted), geometry/triangle.wgsl (area_of, pixel_bounds, setup_of), geometry/work.wgsl
-// (append_work_item).
+// geometry/corners.wgsl (is_outside, screen_triangle), geometry/culling.wgsl (passes_culling),
+// geometry/small.wgsl or mixed/lists.wgsl or mixed/points.wgsl (draw_small), geometry/triangle.wgsl
+// (area_of, pixel_bounds, setup_of), geometry/work.wgsl (append_work_item), mixed/lists.wgsl or
+// mixed/points.wgsl or peeling/emit_layer.wgsl or samples/emit.wgsl (is_any_wanted).
 
 @compute @workgroup_size(WORKGROUP)
 fn visibility(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     begin_job(gid.z);
     let i = gid.x + gid.y * groups.x * WORKGROUP;
-    if i >= batch.count || is_peeling_done() || !is_any_wanted() {
+    if i >= batch.count || !is_any_wanted() {
         return;
     }
     let t = batch.first + i;

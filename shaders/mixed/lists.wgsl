@@ -22,6 +22,11 @@ fn draw_small(s: Setup, bounds: vec4<i32>, id: u32) {
     }
 }
 
+// Corner of a block, given its first pixel.
+fn block_corner(pixel: vec2<i32>) -> vec2<i32> {
+    return pixel_corner(pixel);
+}
+
 fn draw_pixel(s: Setup, e: Edges, values: vec3<i32>, in_block: vec2<i32>, pixel: vec2<i32>, id: u32) {
     append(s, e, pixel, id);
 }

@@ -1,4 +1,4 @@
-// Stage occlusion, per pixel: the place of what its first sample shows, before the far plane. Twin of
+// Stage occlusion, per pixel: writes the place of its first sample, which place.wgsl explains. Twin of
 // src/render/backend/cpu/occlusion/grid.rs.
 //
 // Uses: common.wgsl (first_visibility_sample, WORKGROUP), one_job.wgsl or gang.wgsl (batch,

@@ -1,4 +1,5 @@
-// Stage occlusion: places before the far plane. The CPU's are in src/render/backend/cpu/occlusion/grid.rs.
+// Stage occlusion: the place of a sample is its distance from the far plane towards the viewer, in pixels. The CPU's
+// are in src/render/backend/cpu/occlusion/grid.rs.
 //
 // Uses: common.wgsl (recip, rn), one_job.wgsl or gang.wgsl (frame).
 

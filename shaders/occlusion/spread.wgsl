@@ -1,5 +1,5 @@
-// Stage occlusion, per pixel: a weighted mean of what pixels around it that show the same surface found. Twin of
-// src/render/backend/cpu/occlusion/spread.rs.
+// Stage occlusion, per pixel: smooths the darkness of hollows, by a weighted mean over the neighbours that show the same
+// surface. Twin of src/render/backend/cpu/occlusion/spread.rs.
 //
 // Uses: common.wgsl (rn, round_to_i32), one_job.wgsl or gang.wgsl (frame), occlusion/place.wgsl
 // (is_in_picture, NOWHERE, place_of).

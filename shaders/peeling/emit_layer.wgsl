@@ -1,13 +1,18 @@
 // Stage visibility, per sample of a peeled layer: keeps the nearest triangle behind the previous
 // layer. Twin of src/render/backend/cpu/peeling/emit_layer.rs.
 //
-// Uses: common.wgsl (BEHIND_SURFACE, has, sample_count), one_job.wgsl (batch), peeling/state.wgsl
-// (PeelState), samples/samples.wgsl (sample_index), samples/samples32.wgsl or
-// samples/samples64.wgsl (keep_nearest).
+// Uses: common.wgsl (BEHIND_SURFACE, has, sample_count), one_job.wgsl (batch), peeling/rounds.wgsl
+// (is_peeling_done), peeling/state.wgsl (PeelState), samples/samples.wgsl (sample_index),
+// samples/samples32.wgsl or samples/samples64.wgsl (keep_nearest).
 
 // The visibility buffer; `samples` is bound to the layer.
 @group(1) @binding(26) var<storage, read> base: array<vec2<u32>>;
 @group(1) @binding(27) var<storage, read> peel_state: array<PeelState>;
+
+// True if triangles are drawn at all.
+fn is_any_wanted() -> bool {
+    return !is_peeling_done();
+}
 
 fn emit(pixel: vec2<i32>, n: i32, z: f32, id: u32) {
     let index = sample_index(pixel.x, pixel.y, n);

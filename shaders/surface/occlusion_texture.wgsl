@@ -1,4 +1,4 @@
-// Stage shade, per point: the file's occlusion texture, which darkens ambient light and no other. Twin of
+// Stage shade, per point: the file's occlusion texture, which darkens ambient light only. Twin of
 // src/render/backend/cpu/surface/occlusion_texture.rs.
 //
 // Uses: common.wgsl (dot3, rn), one_job.wgsl or gang.wgsl (frame), surface/light.wgsl (Light).

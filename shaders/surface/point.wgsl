@@ -1,7 +1,7 @@
 // Stage shade, per point: the colour of a point of the surface. Twin of
 // src/render/backend/cpu/surface/point.rs.
 //
-// Uses: common.wgsl (DEBUG, has, OCCLUSION, rn, rn3, rn4, rolled_off, TEXTURES, VARYING,
+// Uses: common.wgsl (DEBUG, has, rn, rn3, rn4, rolled_off, TEXTURES, VARYING,
 // VERTEX_COLORS, WIRE_LIT, WIRES), one_job.wgsl or gang.wgsl (frame), surface/barycentric.wgsl
 // (Barycentrics, barycentrics, blend4, is_front), surface/debug.wgsl (debug_color),
 // surface/light.wgsl (Light, light, lit, unlit), surface/material.wgsl (MATERIAL_BLEND,
@@ -108,10 +108,7 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
 
 // The same light where only a share of it is there.
 fn dimmed(whole: Light, open: f32) -> Light {
-    if has(OCCLUSION) {
-        return Light(rn(whole.gain * open), rn(whole.gloss * open));
-    }
-    return whole;
+    return Light(rn(whole.gain * open), rn(whole.gloss * open));
 }
 
 fn vertex_color(id: u32, b: Barycentrics) -> vec4<f32> {

@@ -58,7 +58,7 @@ impl Mesh {
 
     /// Warnings: faults of the file that were tolerated.
     pub fn warnings(&self) -> &[Warning] {
-        self.model.warnings()
+        &self.model.report().warnings
     }
 }
 
@@ -131,8 +131,8 @@ impl MeshReader {
     /// Reads the mesh.
     pub fn read(self) -> Result<Mesh, Error> {
         let bundle = bundle(self.files)?.with_entry(self.entry).given_by(Origin::Library);
-        let mut budget = Budget::new(&self.limits);
-        let model = Model::read(&bundle, self.options, &self.limits, &mut budget, &self.deadline)?;
+        let budget = Budget::new(&self.limits);
+        let model = Model::read(&bundle, self.options, &self.limits, budget, &self.deadline)?;
         Ok(Mesh { model: Arc::new(model) })
     }
 }

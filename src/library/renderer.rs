@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use meshsnap_render::backend::{BackendKind, Backends, GpuHost, HardwareHint};
-use meshsnap_render::image::Image;
+use meshsnap_render::image::{Image, LinearImage};
 use meshsnap_render::limits::{Budget, Deadline, Limits};
-use meshsnap_render::pipeline::{self, Context, DrawReport, Drawn, FaceBuffer, Stage};
+use meshsnap_render::pipeline::{self, Context, DrawReport, Drawn, FaceBuffer, Model, RenderError, Stage};
 use meshsnap_render::plan::Skip;
 use meshsnap_render::spec::{self, BackendChoice};
 use meshsnap_render::warning::Warning;
@@ -39,9 +39,9 @@ pub struct Renderer {
 /// A picture, and what there is to say about it.
 #[derive(Debug)]
 #[non_exhaustive]
-pub struct Picture {
+pub struct Picture<I = Image> {
     /// The picture.
-    pub image: Image,
+    pub image: I,
     /// The back-end that drew it.
     pub backend: BackendKind,
     /// The parts of drawing that the plan left out, with reasons. No skip changes a byte of the
@@ -116,14 +116,26 @@ impl Renderer {
 
     /// Draws a mesh, and says how.
     pub fn picture(&mut self, mesh: &Mesh, spec: &Spec, watch: Watch<'_>) -> Result<Picture, Error> {
-        let (spec, mut nothing) = (self.understood(spec)?, |_| {});
-        let Watch { deadline, progress } = watch;
-        let ended = progress.unwrap_or(&mut nothing);
-        let budget = Budget::new(&self.limits);
-        let context = Context { backends: &mut self.backends, budget, deadline: &deadline, ended };
-        let Drawn { image, report } = pipeline::draw(&mesh.model, &spec, context)?;
-        let DrawReport { backend, skips, warnings, .. } = report;
-        Ok(Picture { image, backend, skips, warnings })
+        self.drawn(mesh, spec, watch, pipeline::draw)
+    }
+
+    /// Draws a mesh in linear light, as half floats. A view alone: the views of a turntable and the legend are left out.
+    ///
+    /// ```
+    /// use meshsnap::{Mesh, Renderer, Spec, Watch};
+    ///
+    /// # std::env::set_current_dir("../..")?;
+    /// let mesh = Mesh::read(&std::fs::read("api/examples/knot.obj")?)?;
+    /// let spec = Spec::smooth().size(96, 96).transparent();
+    /// let image = Renderer::cpu().linear(&mesh, &spec, Watch::default())?.image;
+    /// let [red, green, blue, alpha] = image.pixel(48, 48).map(f32::from);
+    /// let values: Vec<u16> = image.rgba.as_flattened().iter().map(|value| value.to_bits()).collect();
+    /// # assert_eq!((values.len(), alpha), (96 * 96 * 4, 1.0));
+    /// # assert!([red, green, blue].iter().all(|&value| value > 0.0 && value < 1.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn linear(&mut self, mesh: &Mesh, spec: &Spec, watch: Watch<'_>) -> Result<Picture<LinearImage>, Error> {
+        self.drawn(mesh, spec, watch, pipeline::draw_linear)
     }
 
     /// Finds the triangle that each pixel of the same picture shows at its centre, and its distance. Always on the CPU.
@@ -134,6 +146,23 @@ impl Renderer {
         let budget = Budget::new(&self.limits);
         let mut context = Context { backends: &mut self.backends, budget, deadline: &deadline, ended };
         Ok(pipeline::find_faces(mesh.model.view(), &spec, &mut context)?)
+    }
+
+    fn drawn<I>(
+        &mut self,
+        mesh: &Mesh,
+        spec: &Spec,
+        watch: Watch<'_>,
+        draw: fn(&Model, &spec::Spec, Context<'_>) -> Result<Drawn<I>, RenderError>,
+    ) -> Result<Picture<I>, Error> {
+        let (spec, mut nothing) = (self.understood(spec)?, |_| {});
+        let Watch { deadline, progress } = watch;
+        let ended = progress.unwrap_or(&mut nothing);
+        let budget = Budget::new(&self.limits);
+        let context = Context { backends: &mut self.backends, budget, deadline: &deadline, ended };
+        let Drawn { image, report } = draw(&mesh.model, &spec, context)?;
+        let DrawReport { backend, skips, warnings, .. } = report;
+        Ok(Picture { image, backend, skips, warnings })
     }
 
     fn understood(&self, spec: &Spec) -> Result<spec::Spec, Error> {
@@ -203,6 +232,23 @@ mod tests {
         deadline.stop();
         let error = renderer.picture(&mesh, &spec, Watch::default().deadline(&deadline)).unwrap_err();
         assert_eq!(error.fault(), crate::Fault::Deadline);
+    }
+
+    #[test]
+    fn a_picture_in_linear_light_is_one_view_and_counts_as_memory() {
+        let mesh = Mesh::read(CUBE.as_bytes()).unwrap();
+        let spec = Spec::unlit().size(32, 24).surface_color("#fff").background("#000").set("sheet.turntable", "4");
+        let picture = Renderer::cpu().linear(&mesh, &spec, Watch::default()).unwrap();
+        let image = picture.image;
+        assert_eq!(
+            (image.width_px, image.height_px, image.rgba.len(), picture.backend),
+            (32, 24, 768, BackendKind::Cpu)
+        );
+        assert_eq!(image.pixel(16, 12), [1.0; 4].map(crate::f16::from_f32));
+        assert_eq!(image.pixel(0, 0), [0.0, 0.0, 0.0, 1.0].map(crate::f16::from_f32));
+        let mut renderer = Renderer::cpu().limits(Limits::default().with(|limits| limits.memory_bytes = 10_000));
+        let error = renderer.linear(&mesh, &spec, Watch::default()).unwrap_err();
+        assert!(error.to_string().contains("linear light"), "{error}");
     }
 
     /// The front of the cube, y = 0 with z up, is quad 3: triangles 4 and 5.

@@ -3,6 +3,8 @@
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
+pub use half::f16;
+
 use crate::srgb::srgb_to_linear;
 
 /// The default of `image.effort`: quick, because pictures are drawn more often than stored.
@@ -17,6 +19,23 @@ pub struct Image {
     pub height_px: u32,
     /// R, G, B and A of each pixel, `width_px * height_px * 4` bytes.
     pub rgba: Pixels,
+}
+
+/// Pixels in linear light with premultiplied alpha, as half floats, rows from the top: what compositing programs and
+/// OpenEXR expect.
+///
+/// The primaries are those of sRGB, and 1 is its white. Each value is the one that an [`Image`] stores as a byte, rounded to
+/// the nearest half float instead, so it is light for a display: what lamps give is rolled off below white. Nothing is
+/// clamped: what shines by itself (`surface.emissive`) comes on top of that and may exceed 1.
+#[derive(Clone, PartialEq)]
+#[non_exhaustive]
+pub struct LinearImage {
+    /// Columns.
+    pub width_px: u32,
+    /// Rows.
+    pub height_px: u32,
+    /// R, G, B and A of each pixel, `width_px * height_px` of them. `rgba.as_flattened()` is the list of their values.
+    pub rgba: Vec<[f16; 4]>,
 }
 
 /// The bytes of a picture. They may lie in memory that a GPU has written: then encoders read them in place, and the
@@ -130,6 +149,19 @@ impl Image {
 impl std::fmt::Debug for Image {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Image({}x{})", self.width_px, self.height_px)
+    }
+}
+
+impl LinearImage {
+    /// R, G, B and A at column `x`, row `y`.
+    pub fn pixel(&self, x: u32, y: u32) -> [f16; 4] {
+        self.rgba[y as usize * self.width_px as usize + x as usize]
+    }
+}
+
+impl std::fmt::Debug for LinearImage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "LinearImage({}x{})", self.width_px, self.height_px)
     }
 }
 

@@ -77,6 +77,7 @@ pub const JOB_MS_MAX: u64 = 24 * 3600 * 1000;
 
 /// A cap that the input exceeds.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 #[error("{what} is more than {limit} (raise the limit with {flag})")]
 pub struct LimitExceeded {
     /// The thing that was counted, in words: "the number of triangles".
@@ -86,6 +87,7 @@ pub struct LimitExceeded {
     /// The largest count that is allowed.
     pub limit: u64,
     /// The `serve` flag that raises the limit.
+    #[cfg_attr(feature = "isolate", serde(skip))]
     pub flag: &'static str,
 }
 

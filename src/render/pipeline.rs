@@ -11,11 +11,11 @@ mod faces;
 
 pub use faces::{FaceBuffer, find_faces};
 
-use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes};
+use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes, Renderer};
 use crate::caption::{Scale, draw_legend};
 use crate::encode::{self, EncodeError};
-use crate::image::{Image, ImageFormat, RowSink};
-use crate::import::{self, Bundle, Format, Imported, MeshError};
+use crate::image::{Image, ImageFormat, LinearImage, RowSink};
+use crate::import::{self, Bundle, Format, ImportReport, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
 use crate::plan::{self, DrawPlan, Prepared, Skip, UvLayout};
@@ -40,16 +40,16 @@ pub struct Context<'a> {
 /// Turns the bytes of a mesh into the bytes of a picture.
 ///
 /// `limits` are those of the file; the memory that is left is the context's.
-pub fn render(job: Job<'_>, limits: &Limits, mut cx: Context<'_>) -> Result<Output, RenderError> {
+pub fn render(job: Job<'_>, limits: &Limits, cx: Context<'_>) -> Result<Output, RenderError> {
     // Bytes -> Mesh
     let Job { bundle, format_in, spec } = job;
     let options = import::Options { format: format_in, time_s: spec.time_s, ..import::Options::default() };
-    let model = Model::read(&bundle, options, limits, &mut cx.budget, cx.deadline)?;
+    let model = Model::read(&bundle, options, limits, cx.budget, cx.deadline)?;
     // The files' memory is free for drawing, unless the caller holds them, too.
     drop(bundle);
     (cx.ended)(Stage::Parse);
 
-    render_model(&model, spec, cx)
+    render_model(&model, spec, Context { budget: model.budget.clone(), ..cx })
 }
 
 /// Turns a mesh that is in memory already into the bytes of a picture.
@@ -77,7 +77,7 @@ pub fn render_model(model: &Model, spec: &Spec, mut cx: Context<'_>) -> Result<O
     };
     (cx.ended)(Stage::Encode);
 
-    let mut warnings = [model.warnings.clone(), report.warnings].concat();
+    let mut warnings = [model.report.warnings.clone(), report.warnings].concat();
     if spec.camera.has_own_up() {
         warnings.retain(|warning| warning.code != import::up_axis::CODE);
     }
@@ -91,6 +91,19 @@ pub fn draw(model: &Model, spec: &Spec, mut cx: Context<'_>) -> Result<Drawn, Re
         Some(sheet) => draw_sheet(model.view(), (sheet, false), spec, &mut cx),
         None => draw_view(model.view(), spec, None, &mut cx),
     }
+}
+
+/// Bytes per pixel of a picture in linear light: its half floats, and the colours that they are rounded from.
+const LINEAR_BYTES: u64 = 8 + 16;
+
+/// The same in linear light, of one view: a sheet and a legend are left out.
+pub fn draw_linear(model: &Model, spec: &Spec, mut cx: Context<'_>) -> Result<Drawn<LinearImage>, RenderError> {
+    let spec = Spec { sheet: None, ..spec.clone() };
+    let pixels = u64::from(spec.image.width_px) * u64::from(spec.image.height_px);
+    cx.budget.spend("the picture in linear light", pixels, LINEAR_BYTES).map_err(PlanError::Limit)?;
+    let mut draw =
+        |renderer: &mut dyn Renderer, plan: &DrawPlan<'_>, deadline: &Deadline| renderer.draw_linear(plan, deadline);
+    draw_view_by(model.view(), &spec, &mut cx, &mut draw, |_, _, _| {})
 }
 
 /// Draws all views of a sheet: into a grid, or else as the frames of an animation, from top to bottom.
@@ -150,9 +163,33 @@ pub fn draw_cells(
 pub fn draw_view(
     view: View<'_>,
     spec: &Spec,
-    sink: Option<&mut dyn RowSink>,
+    mut sink: Option<&mut dyn RowSink>,
     cx: &mut Context<'_>,
 ) -> Result<Drawn, RenderError> {
+    let mut draw = |renderer: &mut dyn Renderer, plan: &DrawPlan<'_>, deadline: &Deadline| match sink.as_deref_mut() {
+        Some(sink) => renderer.draw_rows(plan, sink, deadline),
+        None => renderer.draw(plan, deadline),
+    };
+    draw_view_by(view, spec, cx, &mut draw, |image, spec, plan| {
+        if spec.image.legend {
+            let legends = plan.legends.iter();
+            let scales = legends.map(|plan::Legend { title, ends, colors }| Scale { title, ends: *ends, colors });
+            draw_legend(image, &scales.collect::<Vec<_>>());
+        }
+    })
+}
+
+/// Draws a plan on a back-end.
+type Draw<'a, I> = &'a mut dyn FnMut(&mut dyn Renderer, &DrawPlan<'_>, &Deadline) -> Result<I, DrawError>;
+
+/// Has a back-end draw one view, and finishes its picture.
+fn draw_view_by<I>(
+    view: View<'_>,
+    spec: &Spec,
+    cx: &mut Context<'_>,
+    draw: Draw<'_, I>,
+    finish: impl FnOnce(&mut I, &Spec, &DrawPlan<'_>),
+) -> Result<Drawn<I>, RenderError> {
     let Context { backends, budget, deadline, ended } = cx;
     let has_gpu = backends.has_gpu();
     with_scene(view, spec, has_gpu, budget, deadline, |staged, budget| {
@@ -164,12 +201,8 @@ pub fn draw_view(
         ended(Stage::Plan);
 
         // DrawPlan -> Image
-        let mut drawn = backends.draw(scene.spec.backend, &plan, sink, deadline)?;
-        if scene.spec.image.legend {
-            let legends = plan.legends.iter();
-            let scales = legends.map(|plan::Legend { title, ends, colors }| Scale { title, ends: *ends, colors });
-            draw_legend(&mut drawn.image, &scales.collect::<Vec<_>>());
-        }
+        let mut drawn = backends.draw_by(scene.spec.backend, &plan, &mut |renderer| draw(renderer, &plan, deadline))?;
+        finish(&mut drawn.image, scene.spec, &plan);
         ended(Stage::Render);
 
         let of_layout = std::mem::take(&mut warnings.of_layout);
@@ -250,15 +283,14 @@ pub fn with_plan(
     })
 }
 
-/// A mesh in memory: imported once, and drawn as often as wanted. What one picture finds out about
+/// A mesh in memory: imported once, and drawn, judged and compared as often as wanted. What one picture finds out about
 /// it, such as its edges, serves the next.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Model {
-    /// The mesh.
     mesh: Mesh,
-    /// Faults of the file that were tolerated.
-    warnings: Vec<Warning>,
+    report: ImportReport,
     prepared: Prepared,
+    budget: Budget,
 }
 
 /// A mesh as it is drawn.
@@ -273,16 +305,16 @@ pub struct View<'a> {
 }
 
 impl Model {
-    /// Reads a file.
+    /// Reads a file, which takes its memory from the budget. The rest is for what is done with the mesh.
     pub fn read(
         bundle: &Bundle,
         options: impl Into<import::Options>,
         limits: &Limits,
-        budget: &mut Budget,
+        mut budget: Budget,
         deadline: &Deadline,
     ) -> Result<Self, MeshError> {
-        let Imported { mesh, report, .. } = import::import(bundle, options, limits, budget, deadline)?;
-        Ok(Self { mesh, warnings: report.warnings, prepared: Prepared::default() })
+        let (mesh, report) = import::import(bundle, options, limits, &mut budget, deadline)?;
+        Ok(Self { mesh, report, prepared: Prepared::default(), budget })
     }
 
     /// The mesh.
@@ -290,20 +322,39 @@ impl Model {
         &self.mesh
     }
 
+    /// The report on its file.
+    pub fn report(&self) -> &ImportReport {
+        &self.report
+    }
+
     /// The mesh as it is drawn, with the camera fitted to it.
     pub fn view(&self) -> View<'_> {
         View { mesh: &self.mesh, prepared: &self.prepared, framing: None }
     }
 
-    /// Faults of the file that were tolerated.
-    pub fn warnings(&self) -> &[Warning] {
-        &self.warnings
+    /// The job's budget after reading it.
+    pub fn budget(&self) -> &Budget {
+        &self.budget
+    }
+
+    /// The job's budget after reading it and another mesh, if there is one.
+    pub fn budget_beside(&self, other: Option<&Self>) -> Result<Budget, MeshError> {
+        let mut budget = self.budget.clone();
+        if let Some(other) = other {
+            budget.spend("the other mesh", other.budget.spent_bytes(), 1)?;
+        }
+        Ok(budget)
+    }
+
+    /// The same with a budget that borrows from no lender, for a mesh that outlives its job.
+    #[must_use]
+    pub fn without_lender(self) -> Self {
+        Self { budget: self.budget.lent_by(None, 0), ..self }
     }
 
     /// Memory that it takes, with what pictures have found out so far, bytes.
     pub fn bytes(&self) -> u64 {
-        let warnings = self.warnings.iter().map(Warning::bytes).sum::<usize>();
-        size_of::<Self>() as u64 + self.mesh.bytes() + self.prepared.bytes() + warnings as u64
+        size_of::<Self>() as u64 + self.mesh.bytes() + self.report.bytes() + self.prepared.bytes()
     }
 }
 
@@ -331,9 +382,9 @@ pub struct Output {
 
 /// The output of [`draw`].
 #[derive(Debug)]
-pub struct Drawn {
+pub struct Drawn<I = Image> {
     /// The picture.
-    pub image: Image,
+    pub image: I,
     /// The way it was drawn.
     pub report: DrawReport,
 }
@@ -377,6 +428,7 @@ impl DrawReport {
 /// The stages whose durations a response reports. Each is announced when it ends; of a sheet, once for each
 /// view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Stage {
     /// Bytes to mesh.
     Parse,

@@ -10,7 +10,7 @@ use quick_cache::sync::GuardResult;
 
 use super::cache::{ByteCache, Weighed, shrink_for, with_room_for};
 use super::memory::{Account, Memory, MemoryShare};
-use meshsnap_render::limits::{Budget, Deadline};
+use meshsnap_render::limits::Deadline;
 use meshsnap_render::pipeline::{Model, RenderError};
 
 /// Bytes that a mesh takes in the cache beside its lists: their heads, the key, places in tables.
@@ -25,10 +25,8 @@ const TYPICAL_BYTES: u64 = 1 << 20;
 /// A mesh in memory.
 #[derive(Debug)]
 pub struct Resident {
-    /// The mesh.
+    /// The mesh. Its budget is a job's after reading it, so that a job that reads nothing has as much left.
     pub model: Model,
-    /// A job's budget after reading it, so that a job that reads nothing has as much left.
-    pub budget: Budget,
     /// The bytes that it counts with as long as anything holds it. None: it is not kept, and is its job's memory.
     memory: MemoryShare,
 }
@@ -88,11 +86,11 @@ impl Residents {
         &self,
         key: &str,
         deadline: &Deadline,
-        read: impl FnOnce() -> Result<(Model, Budget), RenderError>,
+        read: impl FnOnce() -> Result<Model, RenderError>,
     ) -> Result<FoundMesh, RenderError> {
         let read = || {
-            let (model, budget) = read()?;
-            Ok(Arc::new(Resident { model, budget, memory: self.memory.share(Account::Residents) }))
+            let model = read()?.without_lender();
+            Ok(Arc::new(Resident { model, memory: self.memory.share(Account::Residents) }))
         };
         if self.bytes == 0 {
             return read().map(|resident| FoundMesh { resident, was_kept: false });

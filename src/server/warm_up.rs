@@ -66,9 +66,8 @@ fn warm(gpu: Arc<GpuHost>, deadline: &Deadline) {
     let began = Instant::now();
     let limits = Limits::default();
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
-    let read = |obj: String| {
-        Model::read(&Bundle::of_one(obj.into_bytes()), None, &limits, &mut Budget::new(&limits), deadline)
-    };
+    let read =
+        |obj: String| Model::read(&Bundle::of_one(obj.into_bytes()), None, &limits, Budget::new(&limits), deadline);
     let (model, large) = match (read(MESH.to_owned()), read([MESH, &"f 1 2 3\n".repeat(MANY)].concat())) {
         (Ok(model), Ok(large)) => (model, large),
         (Err(error), _) | (_, Err(error)) => return tracing::debug!(%error, "the GPU is not warmed up"),

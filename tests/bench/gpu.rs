@@ -76,7 +76,7 @@ fn ms(began: Instant) -> f64 {
 fn read(file: &MeshFile) -> Mesh {
     let limits = Limits::default().with(|limits| limits.memory_bytes = 16 << 30);
     let bundle = Bundle::of_one(file.bytes.clone());
-    import::import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap().mesh
+    import::import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap().0
 }
 
 /// Draws one look of a mesh `rounds` times on each worker, with each number of samples in turns, and prints a line for

@@ -2,7 +2,7 @@
 //! memory stays flat.
 //!
 //!     cargo bench --bench load                                # 64 connections, 30 s, api/examples/knot.obj
-//!     cargo bench --bench load -- --mesh suzanne.obj --seconds 10 --query 'style=wire&size=256'
+//!     cargo bench --bench load -- --mesh model.obj --seconds 10 --query 'style=wire&size=256'
 //!     cargo bench --bench load -- --url 127.0.0.1:8080        # a server that runs already (no memory is sampled)
 //!
 //! Starts a server of its own unless told where one is. Ends with a failure if anything but 200 and

@@ -5,26 +5,17 @@ use std::rc::Rc;
 use super::places::{self, Faults};
 use super::{ALL_PLACES_MAX, Check, Figure, Level, Options, PLACES_MAX, Place, Rule, RuleSet, polygons, uvs, volume};
 use crate::geometry::intersections;
+use crate::images::checked_header;
 use crate::report::Bounds;
-use meshsnap_render::import::{ImportReport, MeshError, MeshFault};
+use meshsnap_render::import::{MeshError, MeshFault};
 use meshsnap_render::limits::{Budget, Deadline};
 use meshsnap_render::mesh::Mesh;
 use meshsnap_render::mesh::edges::EdgeList;
 use meshsnap_render::mesh::material::{ImageContent, ImageSource};
 use meshsnap_render::mesh::topology::{self, Topology};
+use meshsnap_render::pipeline::Model;
 use meshsnap_render::pluralise::pluralise;
 use meshsnap_render::texture::{decode, fault_warnings};
-
-/// A file that was read.
-#[derive(Clone, Copy, Debug)]
-pub struct Subject<'a> {
-    /// Its mesh.
-    pub mesh: &'a Mesh,
-    /// Its import.
-    pub import: &'a ImportReport,
-    /// Its bytes, with those of the files that it refers to.
-    pub file_bytes: u64,
-}
 
 /// The one check of a file that cannot be read, whether `opens` is among the rules or not.
 pub fn unopened(detail: impl Into<String>) -> Check {
@@ -42,19 +33,15 @@ pub fn of_unreadable(error: &MeshError) -> Option<Check> {
     }
 }
 
-/// Judges a file: a check for each rule, in the order of the rules.
-pub fn check(
-    subject: &Subject<'_>,
-    rules: &RuleSet,
-    options: Options,
-    budget: &mut Budget,
-    deadline: &Deadline,
-) -> Result<Vec<Check>, MeshError> {
+/// Judges a file: a check for each rule, in the order of the rules. Fails where the time of the job ends, and by its
+/// memory unless rules are to tell that.
+pub fn check(model: &Model, rules: &RuleSet, options: Options, deadline: &Deadline) -> Result<Vec<Check>, MeshError> {
+    let budget = &mut model.budget().clone();
     if options.all_places {
         budget.spend("the places of faults", ALL_PLACES_MAX as u64, size_of::<Place>() as u64)?;
     }
     let places_max = if options.all_places { ALL_PLACES_MAX } else { PLACES_MAX };
-    let mut judge = Judge { subject: *subject, edges: None, topology: None, places_max, budget, deadline };
+    let mut judge = Judge { model, edges: None, topology: None, places_max, budget, deadline };
     let of_rule = |&(rule, level): &(Rule, Level)| {
         deadline.check()?;
         let finding = match judge.finding(rule) {
@@ -72,7 +59,7 @@ pub fn check(
 }
 
 struct Judge<'a> {
-    subject: Subject<'a>,
+    model: &'a Model,
     /// The edges, once a rule has asked for them.
     edges: Option<Rc<EdgeList>>,
     /// The topology, once a rule has asked for it.
@@ -129,7 +116,7 @@ impl Finding {
 
 impl Judge<'_> {
     fn finding(&mut self, rule: Rule) -> Result<Finding, MeshError> {
-        let Subject { mesh, import, file_bytes } = self.subject;
+        let (mesh, import) = (self.model.mesh(), self.model.report());
         Ok(match rule {
             Rule::Opens => Finding::presence(true, "it opens", ""),
             Rule::NoWarnings => self.warnings(),
@@ -196,7 +183,7 @@ impl Judge<'_> {
             Rule::MaxVertices(max) => Finding::at_most(import.file_vertices, max, "vertex", "vertices"),
             Rule::MaxMaterials(max) => Finding::at_most(mesh.materials.len() as u64, max, "material", "materials"),
             Rule::MaxTexturePx(max) => self.textures(max),
-            Rule::MaxFileBytes(max) => Finding::at_most(file_bytes, max, "byte", "bytes"),
+            Rule::MaxFileBytes(max) => Finding::at_most(import.file_bytes, max, "byte", "bytes"),
             Rule::Bounds(allowed) => bounds(mesh, allowed),
         })
     }
@@ -205,7 +192,7 @@ impl Judge<'_> {
         if let Some(edges) = &self.edges {
             return Ok(edges.clone());
         }
-        let edges = EdgeList::of(self.subject.mesh, self.budget)?;
+        let edges = EdgeList::of(self.model.mesh(), self.budget)?;
         self.deadline.check()?;
         Ok(self.edges.insert(Rc::new(edges)).clone())
     }
@@ -215,20 +202,20 @@ impl Judge<'_> {
             return Ok(topology.clone());
         }
         let edges = self.edges()?;
-        let topology = Topology::of(self.subject.mesh, &edges, self.budget, self.deadline)?;
+        let topology = Topology::of(self.model.mesh(), &edges, self.budget, self.deadline)?;
         Ok(self.topology.insert(Rc::new(topology)).clone())
     }
 
     fn warnings(&self) -> Finding {
-        let images = self.subject.mesh.images.iter();
+        let images = self.model.mesh().images.iter();
         let fault = |image: &ImageSource| match &image.content {
-            ImageContent::Encoded(bytes) => decode::check(&image.name, bytes).err(),
+            ImageContent::Encoded(bytes) => checked_header(&image.name, bytes).err(),
             ImageContent::Absent => None,
         };
         let faults: Vec<_> = images.filter_map(fault).collect();
         let of_images = fault_warnings(&faults);
         let all: Vec<&str> =
-            self.subject.import.warnings.iter().chain(&of_images).map(|warning| warning.detail.as_str()).collect();
+            self.model.report().warnings.iter().chain(&of_images).map(|warning| warning.detail.as_str()).collect();
         let detail = match all.as_slice() {
             [] => "no warnings".to_owned(),
             [one] => (*one).to_owned(),
@@ -238,7 +225,7 @@ impl Judge<'_> {
     }
 
     fn watertight(&mut self) -> Result<Finding, MeshError> {
-        let mesh = self.subject.mesh;
+        let mesh = self.model.mesh();
         let edges = self.edges()?;
         if edges.is_empty() {
             return Ok(Finding::presence(false, "", "it has no faces"));
@@ -267,7 +254,7 @@ impl Judge<'_> {
     }
 
     fn manifold(&mut self) -> Result<Finding, MeshError> {
-        let mesh = self.subject.mesh;
+        let mesh = self.model.mesh();
         let edges = self.edges()?;
         let of_edges =
             Faults::at(edges.iter().filter(|e| e.face_count > 2), self.places_max, |e| places::edge(mesh, &e));
@@ -287,7 +274,7 @@ impl Judge<'_> {
     }
 
     fn winding(&mut self) -> Result<Finding, MeshError> {
-        let mesh = self.subject.mesh;
+        let mesh = self.model.mesh();
         let edges = self.edges()?;
         let turned = edges.iter().filter(|edge| edge.face_count == 2 && edge.has_inconsistent_winding);
         let faults = Faults::at(turned, self.places_max, |edge| places::edge(mesh, &edge));
@@ -299,7 +286,7 @@ impl Judge<'_> {
 
     fn inverted(&mut self) -> Result<Finding, MeshError> {
         let edges = self.edges()?;
-        let (faults, closed) = volume::inverted(self.subject.mesh, &edges, self.places_max, self.budget)?;
+        let (faults, closed) = volume::inverted(self.model.mesh(), &edges, self.places_max, self.budget)?;
         let detail = match (faults.count, closed) {
             (_, 0) => "it has no closed part whose volume has a sign".to_owned(),
             (count, closed) => {
@@ -311,7 +298,7 @@ impl Judge<'_> {
     }
 
     fn uv_overlaps(&mut self) -> Result<Finding, MeshError> {
-        let (faults, is_complete) = uvs::overlaps(self.subject.mesh, self.places_max, self.budget, self.deadline)?;
+        let (faults, is_complete) = uvs::overlaps(self.model.mesh(), self.places_max, self.budget, self.deadline)?;
         let detail = pluralise(faults.count, "face overlaps another", "faces overlap others");
         let at_least = if is_complete { "" } else { "at least " };
         Ok(Finding::of_faults(faults, format!("{at_least}{detail} in the texture")))
@@ -319,7 +306,7 @@ impl Judge<'_> {
 
     fn textures(&self, max_px: u64) -> Finding {
         let mut largest = (0, "");
-        for image in &self.subject.mesh.images {
+        for image in &self.model.mesh().images {
             let ImageContent::Encoded(bytes) = &image.content else { continue };
             // An image that cannot be read is a warning, and has no size.
             let Ok(header) = decode::header(&image.name, bytes) else { continue };

@@ -14,7 +14,7 @@ mod tests;
 mod uvs;
 mod volume;
 
-pub use judge::{Subject, check, of_unreadable, unopened};
+pub use judge::{check, of_unreadable, unopened};
 pub use meaning::meaning;
 pub use rule::{Level, NAMES, Rule, RuleSet, UnknownRule};
 

@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::made_obj::{Obj, SIDES};
-use crate::opened;
 use meshsnap_render::import::Bundle;
 use meshsnap_render::limits::{Budget, Deadline, Limits};
 
@@ -17,8 +16,8 @@ fn judge(text: &str, rule: &str) -> Check {
     let bundle = Bundle::of_one(text.as_bytes().to_vec());
     let deadline = Deadline::default();
     let limits = Limits::default();
-    let mut checks = match opened::open(&bundle, None, &limits, Budget::new(&limits), &deadline) {
-        Ok(opened) => opened.check(&rules, Options::default(), &deadline).unwrap(),
+    let mut checks = match crate::read(&bundle, None, &limits, Budget::new(&limits), &deadline) {
+        Ok(model) => check(&model, &rules, Options::default(), &deadline).unwrap(),
         Err(fault) => vec![unopened(fault.to_string())],
     };
     assert_eq!(checks.len(), 1, "{rule}");
@@ -304,17 +303,17 @@ fn a_limit_that_a_rule_hits_is_told_by_that_rule() {
     let rules = RuleSet::parse(["opens", "watertight"], ["manifold"]).unwrap();
     let bundle = Bundle::of_one(cube().text().into_bytes());
     let deadline = Deadline::default();
-    let opened = |memory_bytes| {
+    let read = |memory_bytes| {
         let limits = Limits::default().with(|limits| limits.memory_bytes = memory_bytes);
-        opened::open(&bundle, None, &limits, Budget::new(&limits), &deadline)
+        crate::read(&bundle, None, &limits, Budget::new(&limits), &deadline)
     };
     // The least memory with which the file opens leaves none for its edges.
-    let least = (0..200).map(|n| 256 * n).find(|bytes| opened(*bytes).is_ok()).unwrap();
-    let opened = opened(least).unwrap();
-    let error = opened.check(&rules, Options::default(), &deadline).unwrap_err();
+    let least = (0..200).map(|n| 256 * n).find(|bytes| read(*bytes).is_ok()).unwrap();
+    let model = read(least).unwrap();
+    let error = check(&model, &rules, Options::default(), &deadline).unwrap_err();
     assert!(matches!(error.fault, meshsnap_render::import::MeshFault::Limit(_)), "{error:?}");
     let options = Options { fails_at_limits: true, ..Options::default() };
-    let checks = opened.check(&rules, options, &deadline).unwrap();
+    let checks = check(&model, &rules, options, &deadline).unwrap();
     assert_eq!(checks.iter().map(|check| check.ok).collect::<Vec<_>>(), [true, false, false]);
     for check in &checks[1..] {
         assert!(check.found.is_none() && check.places.is_empty(), "{check:?}");
@@ -329,8 +328,8 @@ fn all_places_are_listed_on_request_up_to_a_bound_of_the_whole_verdict() {
         let rules = RuleSet::parse(["watertight", "manifold"], ["no-warnings"]).unwrap();
         let bundle = Bundle::of_one(Obj::row(count).text().into_bytes());
         let limits = Limits::default();
-        let opened = opened::open(&bundle, None, &limits, Budget::new(&limits), &Deadline::default()).unwrap();
-        opened.check(&rules, options, &Deadline::default()).unwrap()
+        let model = crate::read(&bundle, None, &limits, Budget::new(&limits), &Deadline::default()).unwrap();
+        check(&model, &rules, options, &Deadline::default()).unwrap()
     };
     let options = Options { all_places: true, ..Options::default() };
     let (all, first) = (with(50, options), with(50, Options::default()));

@@ -30,24 +30,16 @@ use crate::report::{Bounds, TopologyReport, without_rounding};
 use distance::{Measured, OneWay};
 use faces::Faces;
 use holes::{Hole, Numbered};
-use meshsnap_render::import::{ImportReport, MeshError};
+use meshsnap_render::import::MeshError;
 use meshsnap_render::limits::{Budget, Deadline};
 use meshsnap_render::mesh::Mesh;
 use meshsnap_render::mesh::edges::EdgeList;
 use meshsnap_render::mesh::topology::Topology;
+use meshsnap_render::pipeline::Model;
 use parts::Parts;
 
 /// The error of the largest distance at which its search ends, in diagonals of the larger box.
 const ERROR: f64 = 1e-4;
-
-/// A file that was read.
-#[derive(Clone, Copy, Debug)]
-pub struct ComparedFile<'a> {
-    /// Its mesh.
-    pub mesh: &'a Mesh,
-    /// Its import.
-    pub import: &'a ImportReport,
-}
 
 /// The differences between two meshes, `a` and `b`.
 #[derive(Clone, Debug, Serialize)]
@@ -222,8 +214,8 @@ impl Compared {
 
 /// All that a comparison found, from which the summary in words is written.
 struct Comparison<'a> {
-    a: ComparedFile<'a>,
-    b: ComparedFile<'a>,
+    a: &'a Model,
+    b: &'a Model,
     diagonal: f64,
     tolerance: f64,
     /// True if vertices and faces have the same numbers in both.
@@ -237,47 +229,42 @@ struct Comparison<'a> {
     ways: [Option<OneWay>; 2],
 }
 
-/// Compares two meshes. `max_distance` is the largest distance that counts as the same, in file units; None: what
-/// encodings round away.
-pub fn compare(
-    a: ComparedFile<'_>,
-    b: ComparedFile<'_>,
-    max_distance: Option<f64>,
-    budget: &mut Budget,
-    deadline: &Deadline,
-) -> Result<Compared, MeshError> {
-    let meshes = [a.mesh, b.mesh];
+/// Compares two meshes, of which `b` is the newer one. `max_distance` is the largest distance between the surfaces that
+/// counts as the same, in file units; None: what encodings round away.
+pub fn compare(a: &Model, b: &Model, max_distance: Option<f64>, deadline: &Deadline) -> Result<Compared, MeshError> {
+    let budget = &mut a.budget_beside(Some(b))?;
+    let meshes = [a.mesh(), b.mesh()];
     let (diagonal, rounding) = (frame::diagonal(meshes), frame::rounding(meshes));
     let tolerance = max_distance.unwrap_or(rounding);
-    let in_a = rounding / a.mesh.to_file.scale;
-    let numbers = vertices::numbers(a.mesh, b.mesh, in_a, budget)?;
+    let in_a = rounding / a.mesh().to_file.scale;
+    let numbers = vertices::numbers(a.mesh(), b.mesh(), in_a, budget)?;
     deadline.check()?;
     let has_same_order =
-        a.mesh.triangles == b.mesh.triangles && numbers.iter().zip(0..).all(|(number, own)| *number == own);
-    let faces = Faces::of(a.mesh, b.mesh, &numbers, budget)?;
+        a.mesh().triangles == b.mesh().triangles && numbers.iter().zip(0..).all(|(number, own)| *number == own);
+    let faces = Faces::of(a.mesh(), b.mesh(), &numbers, budget)?;
     deadline.check()?;
-    let [edges_a, edges_b] = [EdgeList::of(a.mesh, budget)?, EdgeList::of(b.mesh, budget)?];
+    let [edges_a, edges_b] = [EdgeList::of(a.mesh(), budget)?, EdgeList::of(b.mesh(), budget)?];
     deadline.check()?;
-    let parts = parts::compare([(a.mesh, &edges_a), (b.mesh, &edges_b)], &faces, in_a, budget)?;
+    let parts = parts::compare([(a.mesh(), &edges_a), (b.mesh(), &edges_b)], &faces, in_a, budget)?;
     deadline.check()?;
-    let whole = whole::find(a.mesh, b.mesh, &faces, in_a, budget)?;
+    let whole = whole::find(a.mesh(), b.mesh(), &faces, in_a, budget)?;
     let error = (ERROR * diagonal).max(rounding);
     let decided_by = max_distance.unwrap_or(f64::INFINITY);
     let way = |from, faces, to, budget: &mut Budget| {
         Measured { from, faces, to, error, decided_by }.one_way(budget, deadline)
     };
-    let there = way(a.mesh, faces.removed.as_slice(), b.mesh, &mut budget.clone())?;
-    let back = way(b.mesh, faces.added.as_slice(), a.mesh, &mut budget.clone())?;
+    let there = way(a.mesh(), faces.removed.as_slice(), b.mesh(), &mut budget.clone())?;
+    let back = way(b.mesh(), faces.added.as_slice(), a.mesh(), &mut budget.clone())?;
     deadline.check()?;
     let topologies =
-        [Topology::of(a.mesh, &edges_a, budget, deadline)?, Topology::of(b.mesh, &edges_b, budget, deadline)?];
+        [Topology::of(a.mesh(), &edges_a, budget, deadline)?, Topology::of(b.mesh(), &edges_b, budget, deadline)?];
     let [junctions_a, junctions_b] = meshes.map(|mesh| intersections::t_junctions(mesh, budget, deadline));
     let t_junctions = [junctions_a?, junctions_b?];
-    let of_a = Numbered { mesh: a.mesh, edges: &edges_a, numbers: None };
-    let of_b = Numbered { mesh: b.mesh, edges: &edges_b, numbers: Some(&numbers) };
+    let of_a = Numbered { mesh: a.mesh(), edges: &edges_a, numbers: None };
+    let of_b = Numbered { mesh: b.mesh(), edges: &edges_b, numbers: Some(&numbers) };
     let new_holes = holes::only_in(of_b, of_a, budget)?;
     let closed_holes = holes::only_in(of_a, of_b, budget)?;
-    let materials = materials::compare(a.mesh, b.mesh, &faces.common, budget)?;
+    let materials = materials::compare(a.mesh(), b.mesh(), &faces.common, budget)?;
     let ways = [there, back];
     let found =
         Comparison { a, b, diagonal, tolerance, has_same_order, faces, parts, whole, new_holes, closed_holes, ways };
@@ -290,9 +277,9 @@ impl Comparison<'_> {
             [(self.a, &topologies[0]), (self.b, &topologies[1])].map(|(side, topology)| size(side, topology));
         let geometry = self.geometry();
         let is_same_topology = has_same_faults(&topologies[0], &topologies[1]);
-        let has_same_attributes = words::lost_attributes(self.a.mesh, self.b.mesh).is_empty();
-        let report = |side: ComparedFile<'_>, topology: &Topology, t_junctions: Option<u64>| {
-            let degenerate = side.import.dropped_degenerate_faces + side.import.dropped_collapsed_faces;
+        let has_same_attributes = words::lost_attributes(self.a.mesh(), self.b.mesh()).is_empty();
+        let report = |side: &Model, topology: &Topology, t_junctions: Option<u64>| {
+            let degenerate = side.report().dropped_degenerate_faces + side.report().dropped_collapsed_faces;
             TopologyReport::new(topology.clone(), t_junctions, degenerate)
         };
         let topology = TopologyDifference {
@@ -303,7 +290,7 @@ impl Comparison<'_> {
         let mut difference = Difference {
             same: geometry.same && topology.same && materials.same && has_same_attributes,
             geometry,
-            counts: Sides { a: counts(self.a.mesh), b: counts(self.b.mesh) },
+            counts: Sides { a: counts(self.a.mesh()), b: counts(self.b.mesh()) },
             measures: Sides { a: of_a, b: of_b },
             faces: self.face_counts(),
             parts: self.part_counts(),
@@ -312,7 +299,7 @@ impl Comparison<'_> {
             summary: Vec::new(),
         };
         difference.summary = words::summary(&self, &difference);
-        let scales = [self.b, self.a].map(|side| side.mesh.to_file.scale);
+        let scales = [self.b, self.a].map(|side| side.mesh().to_file.scale);
         let [there, back] = self.ways.each_mut().map(|way| way.take().unwrap_or_default().of_vertices);
         let in_file = |distances: Vec<f64>, scale| distances.into_iter().map(|distance| distance * scale).collect();
         let of_vertices = [in_file(there, scales[0]), in_file(back, scales[1])];
@@ -321,7 +308,7 @@ impl Comparison<'_> {
 
     fn geometry(&self) -> Geometry {
         let tidy = |value: f64| without_rounding(value, self.diagonal);
-        let scales = [self.b, self.a].map(|side| side.mesh.to_file.scale);
+        let scales = [self.b, self.a].map(|side| side.mesh().to_file.scale);
         let held = |value: f64| value.is_finite().then_some(value);
         let way = |index: usize| -> Option<Way> {
             let found = self.ways[index].as_ref()?;
@@ -337,7 +324,7 @@ impl Comparison<'_> {
         let bound = largest(|found| found.max + found.max_error);
         let exact = largest(|found| found.max);
         let stated_error = bound.zip(exact).map(|(bound, max)| tidy((bound - max).max(0.0)));
-        let areas = [self.a, self.b].map(|side| Measures::of(side.mesh).area.unwrap_or(0.0).max(f64::MIN_POSITIVE));
+        let areas = [self.a, self.b].map(|side| Measures::of(side.mesh()).area.unwrap_or(0.0).max(f64::MIN_POSITIVE));
         let share = areas[0] / (areas[0] + areas[1]);
         let mean = a_to_b.zip(b_to_a).map(|(there, back)| tidy(share * there.mean + (1.0 - share) * back.mean));
         let hausdorff = a_to_b.zip(b_to_a).map(|(there, back)| there.max.max(back.max));
@@ -386,9 +373,9 @@ fn counts(mesh: &Mesh) -> Counts {
     }
 }
 
-fn size(side: ComparedFile<'_>, topology: &Topology) -> Size {
-    let Measures { area, volume } = Measures::of(side.mesh);
-    Size { bounds: Bounds::of(side.mesh), area, volume: volume.filter(|_| topology.is_watertight) }
+fn size(side: &Model, topology: &Topology) -> Size {
+    let Measures { area, volume } = Measures::of(side.mesh());
+    Size { bounds: Bounds::of(side.mesh()), area, volume: volume.filter(|_| topology.is_watertight) }
 }
 
 /// True if both surfaces have the same parts, loops and faults. Counts that depend on how a surface is divided

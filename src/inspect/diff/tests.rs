@@ -2,19 +2,18 @@
 
 use super::*;
 use crate::made_obj::Obj;
-use crate::opened::{self, Opened};
 use meshsnap_render::import::Bundle;
 use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_render::mesh::vector::{cross, dot, sub};
 
-fn open(text: &str) -> Opened {
+fn open(text: &str) -> Model {
     let bundle = Bundle::of_one(text.as_bytes().to_vec());
     let limits = Limits::default();
-    opened::open(&bundle, None, &limits, Budget::new(&limits), &Deadline::default()).unwrap()
+    crate::read(&bundle, None, &limits, Budget::new(&limits), &Deadline::default()).unwrap()
 }
 
 fn texts(a: &str, b: &str, max_distance: Option<f64>) -> Difference {
-    open(a).diff(&open(b), max_distance, &Deadline::default()).unwrap().difference
+    compare(&open(a), &open(b), max_distance, &Deadline::default()).unwrap().difference
 }
 
 fn diff(a: &Obj, b: &Obj) -> Difference {
@@ -279,7 +278,7 @@ fn extreme_sizes_and_places_have_an_answer() {
     assert!(!difference.same && !difference.summary.is_empty());
     assert!(texts(point, point, None).same);
     // Time is looked at.
-    let stopped = open(&three().text()).diff(&open(&tiny.text()), None, &Deadline::after_polls(2));
+    let stopped = compare(&open(&three().text()), &open(&tiny.text()), None, &Deadline::after_polls(2));
     assert!(stopped.is_err());
 }
 

@@ -24,7 +24,7 @@ pub fn summary(found: &Comparison<'_>, difference: &Difference) -> Vec<String> {
     holes(found, &mut said);
     topology(found, difference, &mut said);
     materials(&difference.materials, &mut said);
-    let (a, b) = (found.a.mesh, found.b.mesh);
+    let (a, b) = (found.a.mesh(), found.b.mesh());
     said.extend(lost_attributes(a, b));
     let normals = [a, b].map(|mesh| !mesh.normals.is_empty());
     said.extend(presence(normals, "vertex normals"));
@@ -40,8 +40,8 @@ pub fn summary(found: &Comparison<'_>, difference: &Difference) -> Vec<String> {
 
 /// What is said of the surfaces.
 fn geometry(found: &Comparison<'_>, difference: &Difference, said: &mut Vec<String>) {
-    let (a, b) = (found.a.mesh, found.b.mesh);
-    let formats = [found.a.import.format.name(), found.b.import.format.name()];
+    let (a, b) = (found.a.mesh(), found.b.mesh());
+    let formats = [found.a.report().format.name(), found.b.report().format.name()];
     let in_format = match formats[0] == formats[1] {
         true => String::new(),
         false => format!(" (as {}, before as {})", formats[1], formats[0]),
@@ -88,7 +88,7 @@ fn of_whole(whole: &Whole) -> String {
 
 /// What is said of parts that are not as they were.
 fn parts(found: &Comparison<'_>, said: &mut Vec<String>) {
-    let scale = found.a.mesh.to_file.scale;
+    let scale = found.a.mesh().to_file.scale;
     let mut moved: BTreeMap<String, u64> = BTreeMap::new();
     let mut order = Vec::new();
     for part in &found.parts.changed {
@@ -129,9 +129,9 @@ fn of_changed(changed: &Changed, found: &Comparison<'_>) -> Option<String> {
         let farthest = part.vertices.iter().map(|vertex| (of_vertex(vertex), *vertex));
         farthest.fold((0.0, u32::MAX), |best, one| if one.0 > best.0 { one } else { best })
     };
-    let there = largest(before, &found.ways[0], found.b.mesh.to_file.scale);
-    let back = largest(after, &found.ways[1], found.a.mesh.to_file.scale);
-    let ((distance, vertex), mesh) = if back.0 >= there.0 { (back, found.b.mesh) } else { (there, found.a.mesh) };
+    let there = largest(before, &found.ways[0], found.b.mesh().to_file.scale);
+    let back = largest(after, &found.ways[1], found.a.mesh().to_file.scale);
+    let ((distance, vertex), mesh) = if back.0 >= there.0 { (back, found.b.mesh()) } else { (there, found.a.mesh()) };
     if distance > found.tolerance {
         let position = mesh.positions.get(vertex as usize)?.map(f64::from);
         let at = place(in_file(&mesh.to_file, position), found.diagonal);
@@ -150,7 +150,7 @@ fn of_changed(changed: &Changed, found: &Comparison<'_>) -> Option<String> {
 /// What is said of faces that look to the other side.
 fn turned(found: &Comparison<'_>, said: &mut Vec<String>) {
     let turned = &found.faces.turned;
-    let mesh = found.b.mesh;
+    let mesh = found.b.mesh();
     let Some(first) = turned.first() else { return };
     if turned.len() == mesh.triangles.len() && turned.len() > 1 {
         said.push("all faces look to the other side".to_owned());
@@ -255,7 +255,7 @@ fn parts_in_words(count: u64) -> String {
 
 /// The middle of a part.
 fn near(part: &Part, found: &Comparison<'_>) -> String {
-    place(in_file(&found.a.mesh.to_file, part.middle), found.diagonal)
+    place(in_file(&found.a.mesh().to_file, part.middle), found.diagonal)
 }
 
 /// A position, to about the ten-thousandth part of the diagonal.

@@ -19,14 +19,16 @@ pub use self::print::PrintReport;
 pub use self::topology::TopologyReport;
 use crate::geometry::intersections;
 use crate::geometry::measure::Measures;
-use meshsnap_render::import::{self, Bundle, FileContent, FileMetadata, ImportReport, Imported, MeshError};
+use crate::images::checked_header;
+use meshsnap_render::import::{self, Bundle, FileContent, FileMetadata, ImportReport, MeshError};
 use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::mesh::Mesh;
 use meshsnap_render::mesh::edges::EdgeList;
 use meshsnap_render::mesh::material::{FileLens, ImageContent, ImageSource};
 use meshsnap_render::mesh::topology::Topology;
-use meshsnap_render::mesh::{Mesh, UpAxis};
 use meshsnap_render::pipeline::Stage;
-use meshsnap_render::texture::{TextureError, decode, fault_warnings};
+use meshsnap_render::spec::words::word_for;
+use meshsnap_render::texture::{TextureError, fault_warnings};
 use serde::Serialize;
 
 /// Reports what is in a file.
@@ -39,9 +41,9 @@ pub fn inspect(
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Report, MeshError> {
-    let Imported { mesh, report, .. } = import::import(bundle, options, limits, budget, deadline)?;
+    let (mesh, report) = import::import(bundle, options, limits, budget, deadline)?;
     ended(Stage::Parse);
-    Report::of(&mesh, &report, bundle.bytes_len(), extras, budget, deadline)
+    Report::of(&mesh, &report, extras, budget, deadline)
 }
 
 /// The contents of a file. Counts are null where the format has no such thing.
@@ -164,11 +166,10 @@ struct WarningReport {
 }
 
 impl Report {
-    /// On a mesh and its import, which were read from `file_bytes` bytes.
+    /// On a mesh and its import.
     pub fn of(
         mesh: &Mesh,
         import: &ImportReport,
-        file_bytes: u64,
         extras: Extras,
         budget: &mut Budget,
         deadline: &Deadline,
@@ -190,7 +191,7 @@ impl Report {
         let print = extras.print.then(|| PrintReport::of(mesh, &mut budget.clone(), deadline)).transpose()?;
         let parts = extras.parts.then(|| PartsReport::of(mesh, budget, deadline)).transpose()?;
         let uv = extras.uv.then(|| ChartsReport::of(mesh, budget, deadline)).transpose()?;
-        Ok(Self { print, parts, uv, ..Self::new(mesh, import, file_bytes, (topology, t_junctions)) })
+        Ok(Self { print, parts, uv, ..Self::new(mesh, import, (topology, t_junctions)) })
     }
 
     /// The report as JSON, byte for byte as `inspect --json` prints it and HTTP answers.
@@ -208,12 +209,7 @@ impl Report {
         text::text(self) + &more.into_iter().flatten().collect::<String>()
     }
 
-    fn new(
-        mesh: &Mesh,
-        import: &ImportReport,
-        file_bytes: u64,
-        (topology, t_junctions): (Topology, Option<u64>),
-    ) -> Self {
+    fn new(mesh: &Mesh, import: &ImportReport, (topology, t_junctions): (Topology, Option<u64>)) -> Self {
         let FileMetadata {
             generator,
             scenes,
@@ -235,8 +231,8 @@ impl Report {
         Self {
             format: import.format.name(),
             generator,
-            file_bytes,
-            up: up(mesh.up),
+            file_bytes: import.file_bytes,
+            up: word_for(mesh.up),
             scenes,
             nodes,
             meshes,
@@ -286,7 +282,7 @@ fn texture(image: &ImageSource) -> (TextureReport, Option<TextureError>) {
     let none = TextureReport { name, format: None, width_px: None, height_px: None, file_bytes: None };
     let ImageContent::Encoded(bytes) = &image.content else { return (none, None) };
     let file_bytes = Some(bytes.len() as u64);
-    match decode::check(&image.name, bytes) {
+    match checked_header(&image.name, bytes) {
         Ok(header) => {
             let [width_px, height_px] = [header.width, header.height].map(Some);
             (TextureReport { format: Some(header.encoding_name()), width_px, height_px, file_bytes, ..none }, None)
@@ -303,17 +299,5 @@ fn camera(name: String, lens: FileLens) -> CameraReport {
         FileLens::Orthographic { height } => {
             CameraReport { name, projection: "orthographic", fov_deg: None, height: Some(height) }
         }
-    }
-}
-
-/// The axis in the words of the request's `camera.up`.
-fn up(axis: UpAxis) -> &'static str {
-    match axis {
-        UpAxis::X => "x",
-        UpAxis::NegX => "-x",
-        UpAxis::Y => "y",
-        UpAxis::NegY => "-y",
-        UpAxis::Z => "z",
-        UpAxis::NegZ => "-z",
     }
 }

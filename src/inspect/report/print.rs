@@ -8,8 +8,9 @@ use super::without_rounding;
 use crate::geometry::thickness::thicknesses;
 use meshsnap_render::import::MeshError;
 use meshsnap_render::limits::{Budget, Deadline};
+use meshsnap_render::mesh::Mesh;
 use meshsnap_render::mesh::vector::{cross, dot, sub};
-use meshsnap_render::mesh::{Mesh, UpAxis};
+use meshsnap_render::spec::words::word_for;
 
 /// Faces that look down more than this from the vertical hang over: up to it, printers need no support.
 const OVERHANG_DEG: f64 = 45.0;
@@ -81,7 +82,7 @@ impl PrintReport {
     /// On a mesh. None of its figures depends on the order of faces but for the choice of those that are measured.
     pub fn of(mesh: &Mesh, budget: &mut Budget, deadline: &Deadline) -> Result<Self, MeshError> {
         budget.spend("the report on printing", mesh.triangles.len() as u64, BYTES_PER_FACE)?;
-        let up = axis(mesh.up);
+        let up = mesh.up.direction();
         let height = |position: [f64; 3]| dot(position, up);
         let lowest = mesh.positions.iter().map(|p| height(p.map(f64::from))).fold(f64::INFINITY, f64::min);
         let faces: Vec<Face> = mesh.triangles.iter().filter_map(|corners| face(mesh, *corners)).collect();
@@ -98,7 +99,7 @@ impl PrintReport {
         let contact: f64 = faces.iter().filter(|face| is_on_bed(face)).map(|face| face.area).sum();
         let angle = |value: f64| without_rounding(value, 90.0);
         Ok(Self {
-            up: super::up(mesh.up),
+            up: word_for(mesh.up),
             wall_thickness: walls(mesh, budget, deadline)?,
             overhangs: OverhangReport {
                 limit_deg: OVERHANG_DEG,
@@ -183,15 +184,4 @@ fn face(mesh: &Mesh, corners: [u32; 3]) -> Option<Face> {
     let normal = cross(sub(b, a), sub(c, a));
     let length = dot(normal, normal).sqrt();
     (length > 0.0).then(|| Face { normal: normal.map(|value| value / length), area: length / 2.0, corners })
-}
-
-fn axis(up: UpAxis) -> [f64; 3] {
-    match up {
-        UpAxis::X => [1.0, 0.0, 0.0],
-        UpAxis::NegX => [-1.0, 0.0, 0.0],
-        UpAxis::Y => [0.0, 1.0, 0.0],
-        UpAxis::NegY => [0.0, -1.0, 0.0],
-        UpAxis::Z => [0.0, 0.0, 1.0],
-        UpAxis::NegZ => [0.0, 0.0, -1.0],
-    }
 }

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use super::since::Commit;
-use meshsnap_inspect::opened::{self, Opened};
+use meshsnap_inspect::diff;
 use meshsnap_render::import::{Bundle, BundleFile, Options, Origin};
 use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::pipeline::Model;
 
 /// The changes of a mesh.
 #[derive(Default)]
@@ -13,14 +14,14 @@ pub struct Changes {
     /// Sentences, as those of `meshsnap diff`.
     pub sentences: Vec<String>,
     /// The mesh as it is in the commit, if it can be read.
-    pub older: Option<Opened>,
+    pub older: Option<Model>,
 }
 
-/// The changes of an opened mesh. `sources` are the files that were read, the mesh first: each with its path in the
+/// The changes of a mesh. `sources` are the files that were read, the mesh first: each with its path in the
 /// bundle. The older side is read with the same files as they are in the commit.
 pub fn since(
     commit: &Commit,
-    opened: &Opened,
+    model: &Model,
     sources: &[(String, String)],
     options: Options,
     limits: &Limits,
@@ -31,11 +32,11 @@ pub fn since(
         Err(why) => return unreadable(&why),
     };
     let deadline = Deadline::default();
-    let older = match opened::open(&bundle, options, limits, Budget::new(limits), &deadline) {
+    let older = match meshsnap_inspect::read(&bundle, options, limits, Budget::new(limits), &deadline) {
         Ok(older) => older,
         Err(error) => return unreadable(&error.to_string()),
     };
-    let sentences = match older.diff(opened, None, &deadline) {
+    let sentences = match diff::compare(&older, model, None, &deadline) {
         Ok(compared) => compared.difference.summary,
         Err(error) => vec![format!("it cannot be compared with its older side: {error}")],
     };

@@ -161,3 +161,23 @@ fn config(arguments: &CheckArgs) -> Result<Config, CliError> {
         .map(Config::of)
         .map_err(|error| CliError::usage(error.to_string()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use percent_encoding::{percent_decode_str, utf8_percent_encode};
+
+    #[test]
+    fn a_segment_keeps_unreserved_characters_alone() {
+        for byte in 0..=0x7f_u8 {
+            let text = char::from(byte).to_string();
+            let escaped = utf8_percent_encode(&text, SEGMENT).to_string();
+            let is_kept = byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
+            assert_eq!(escaped, if is_kept { text } else { format!("%{byte:02X}") });
+        }
+        let text = "a b/c:d é.stl";
+        let escaped = utf8_percent_encode(text, SEGMENT).to_string();
+        assert_eq!(escaped, "a%20b%2Fc%3Ad%20%C3%A9.stl");
+        assert_eq!(percent_decode_str(&escaped).decode_utf8().unwrap(), text);
+    }
+}

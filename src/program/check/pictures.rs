@@ -1,4 +1,4 @@
-//! Pictures of checked files: each view as it is, as it was accepted, and what differs; faults are marked.
+//! Pictures for reports of `check`: each view of a file now, its accepted picture, and their difference. Faults are marked.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,11 +8,12 @@ use crate::error::CliError;
 use crate::output::{Destination, Inputs};
 use meshsnap_inspect::check::{Check, Place};
 use meshsnap_inspect::diff::pictures::{Picture, flip, flip_heat, sniff};
-use meshsnap_inspect::opened::Opened;
+use meshsnap_inspect::drawing;
 use meshsnap_render::backend::Backends;
 use meshsnap_render::encode;
 use meshsnap_render::image::{Image, ImageFormat};
 use meshsnap_render::limits::{Deadline, Limits};
+use meshsnap_render::pipeline::Model;
 use meshsnap_render::request::{self, Rules, Words, word_for};
 use meshsnap_render::spec::{BackendChoice, NamedView, Spec};
 
@@ -60,7 +61,7 @@ pub struct Against<'a> {
     /// The pictures are accepted from now on.
     pub is_update: bool,
     /// The file as it was, whose pictures count rather than the accepted ones.
-    pub older: Option<&'a Opened>,
+    pub older: Option<&'a Model>,
 }
 
 /// The pictures of a run.
@@ -102,7 +103,7 @@ impl Pictures {
     /// or with those that were accepted.
     pub fn draw(
         &self,
-        opened: &Opened,
+        model: &Model,
         (mesh, checks): (&str, &[Check]),
         against: &Against<'_>,
         backends: &mut Backends,
@@ -114,13 +115,13 @@ impl Pictures {
         for (view, spec) in &self.views {
             let about = |error: CliError| error.about(&format!("{mesh}, {view}"));
             let older = against.older.filter(|_| !against.is_update);
-            let mut draw = |opened: &Opened, beside, spec: &Spec| {
-                opened.draw(beside, spec, backends, &deadline).map_err(|error| about(error.into()))
+            let mut draw = |model: &Model, beside, spec: &Spec| {
+                drawing::draw(model, beside, spec, backends, &deadline).map_err(|error| about(error.into()))
             };
-            let mut image = draw(opened, older, spec)?;
+            let mut image = draw(model, older, spec)?;
             let plain = png(&image)?;
             let before = match (older, against.baseline) {
-                (Some(older), _) => Some(png(&draw(older, Some(opened), &opened.with_up(spec))?)?),
+                (Some(older), _) => Some(png(&draw(older, Some(model), &drawing::with_up(model, spec))?)?),
                 (None, Some(baseline)) if against.is_update => {
                     baseline.keep_picture(mesh, view, &plain)?;
                     None
@@ -132,7 +133,8 @@ impl Pictures {
                 before.filter(|before| *before != plain).map(|before| self.changed(before, &plain)).transpose()?;
             let is_marked = !places.is_empty();
             if is_marked {
-                opened.mark(&mut image, older, spec, &places, &deadline).map_err(|error| about(error.into()))?;
+                drawing::mark(&mut image, model, older, spec, &places, &deadline)
+                    .map_err(|error| about(error.into()))?;
             }
             all.push(ViewPictures { view, after: if is_marked { png(&image)? } else { plain }, changed });
         }

@@ -22,10 +22,10 @@ use crate::progress::Bar;
 use crate::render::{Task, Tasks};
 use crate::siblings::{self, Read};
 use meshsnap_inspect::check::{self, Check, Verdict, unopened};
-use meshsnap_inspect::opened::{self, Opened};
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::backend::{Backends, GpuHost, HardwareHint};
 use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::pipeline::Model;
 use meshsnap_render::pluralise::pluralise;
 use meshsnap_render::spec::NamedView;
 use meshsnap_server::config::{cores, why_no_gpu};
@@ -195,9 +195,9 @@ impl<'a> Run<'a> {
                 digest = Some(Digest::of(&own.bytes).to_string());
             }
             paths = named.bundle.files().iter().map(|file| file.path.clone()).collect();
-            opened::open(&named.bundle, format, &self.limits, Budget::new(&self.limits), &Deadline::default())
+            meshsnap_inspect::read(&named.bundle, format, &self.limits, Budget::new(&self.limits), &Deadline::default())
         });
-        let Read { value: opened, names, unread } = match read {
+        let Read { value: model, names, unread } = match read {
             Ok(read) => read,
             Err(error) if error.exit_code == 3 => return Err(error),
             Err(error) => {
@@ -207,14 +207,15 @@ impl<'a> Run<'a> {
             }
         };
         let mut changes = None;
-        let (checks, pictures) = match opened {
-            Ok(opened) => {
+        let (checks, pictures) = match model {
+            Ok(model) => {
                 let options = check::Options { all_places: self.arguments.all_places, fails_at_limits: true };
-                let checks = opened.check(self.config.rules_of(Path::new(path)), options, &Deadline::default());
+                let rules = self.config.rules_of(Path::new(path));
+                let checks = check::check(&model, rules, options, &Deadline::default());
                 let checks = checks.map_err(|error| CliError::from(error).about(path))?;
-                let Changes { sentences, older } = self.changes(&opened, names.iter().cloned().zip(paths).collect());
+                let Changes { sentences, older } = self.changes(&model, names.iter().cloned().zip(paths).collect());
                 changes = self.commit.is_some().then_some(sentences);
-                let pictures = self.draw((&opened, older.as_ref()), (path, &checks), backends, said)?;
+                let pictures = self.draw((&model, older.as_ref()), (path, &checks), backends, said)?;
                 (checks, pictures)
             }
             Err(error) => (vec![unopened(error.to_string())], Vec::new()),
@@ -229,23 +230,23 @@ impl<'a> Run<'a> {
     }
 
     /// The changes of a mesh since the commit, if there is one.
-    fn changes(&self, opened: &Opened, sources: Vec<(String, String)>) -> Changes {
+    fn changes(&self, model: &Model, sources: Vec<(String, String)>) -> Changes {
         let options = self.arguments.format_in.format().into();
-        let since = |commit| changes::since(commit, opened, &sources, options, &self.limits);
+        let since = |commit| changes::since(commit, model, &sources, options, &self.limits);
         self.commit.as_ref().map(since).unwrap_or_default()
     }
 
     /// Draws the pictures of a file. One that cannot be drawn has none, and fails by its faults alone.
     fn draw(
         &self,
-        (opened, older): (&Opened, Option<&Opened>),
+        (model, older): (&Model, Option<&Model>),
         (path, checks): (&str, &[Check]),
         backends: &mut Backends,
         said: &mut Option<String>,
     ) -> Result<Vec<ViewPictures>, CliError> {
         let Some(pictures) = &self.pictures else { return Ok(Vec::new()) };
         let against = Against { baseline: self.baseline.as_ref(), is_update: self.arguments.update, older };
-        match pictures.draw(opened, (path, checks), &against, backends) {
+        match pictures.draw(model, (path, checks), &against, backends) {
             Err(error) if error.exit_code == 1 => {
                 *said = Some(format!("{}: no pictures are made of it", error.sentence));
                 Ok(Vec::new())

@@ -7,12 +7,13 @@ use crate::bundle::{self, NamedFiles};
 use crate::error::CliError;
 use crate::progress::Progress;
 use crate::{files, siblings};
-use meshsnap_inspect::diff::{Compared, PICTURE_KEYS};
-use meshsnap_inspect::opened::{self, Opened, Side};
+use meshsnap_inspect::diff::{self, Compared, PICTURE_KEYS};
+use meshsnap_inspect::drawing::{self, Side};
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::backend::{Backends, GpuHost, HardwareHint};
 use meshsnap_render::import::Options;
 use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::pipeline::Model;
 use meshsnap_render::request::{self, Rules};
 use meshsnap_render::spec::{BackendChoice, Spec};
 use meshsnap_server::config::{cores, why_no_gpu};
@@ -27,18 +28,17 @@ pub fn run(arguments: &DiffArgs, limits: &Limits) -> Result<bool, CliError> {
     let progress = Progress::start("reading");
     let (named_a, named_b) = (read(arguments, a, limits)?, read(arguments, b, limits)?);
     progress.next("parsing");
-    let (opened_a, opened_b) = (open(arguments, a, &named_a, limits)?, open(arguments, b, &named_b, limits)?);
+    let (model_a, model_b) = (open(arguments, a, &named_a, limits)?, open(arguments, b, &named_b, limits)?);
     progress.next("comparing");
     let about = |error: CliError| error.about(&format!("{a} and {b}"));
-    let mut compared = opened_a
-        .diff(&opened_b, arguments.max_distance, &Deadline::default())
+    let mut compared = diff::compare(&model_a, &model_b, arguments.max_distance, &Deadline::default())
         .map_err(|error| about(CliError::from(error)))?;
     if have_same_bytes(&named_a, &named_b) {
         compared.difference.summary = vec!["the files are equal, byte for byte".to_owned()];
     }
     if !outputs.is_empty() {
         progress.next("drawing");
-        write([&opened_a, &opened_b], &compared, &outputs, limits).map_err(about)?;
+        write([&model_a, &model_b], &compared, &outputs, limits).map_err(about)?;
     }
     drop(progress);
     let text = match arguments.json {
@@ -59,9 +59,9 @@ fn read(arguments: &DiffArgs, name: &str, limits: &Limits) -> Result<NamedFiles,
     bundle::read(&names, None, limits)
 }
 
-fn open(arguments: &DiffArgs, name: &str, named: &NamedFiles, limits: &Limits) -> Result<Opened, CliError> {
+fn open(arguments: &DiffArgs, name: &str, named: &NamedFiles, limits: &Limits) -> Result<Model, CliError> {
     let format = arguments.format_in.format();
-    opened::open(&named.bundle, format, limits, Budget::new(limits), &Deadline::default())
+    meshsnap_inspect::read(&named.bundle, format, limits, Budget::new(limits), &Deadline::default())
         .map_err(|error| CliError::from(error).about(name))
 }
 
@@ -75,7 +75,7 @@ fn have_same_bytes(a: &NamedFiles, b: &NamedFiles) -> bool {
 }
 
 /// Writes pictures, all through one camera.
-fn write(opened: [&Opened; 2], compared: &Compared, outputs: &Outputs<'_>, limits: &Limits) -> Result<(), CliError> {
+fn write(models: [&Model; 2], compared: &Compared, outputs: &Outputs<'_>, limits: &Limits) -> Result<(), CliError> {
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Cpu };
     let spec = |keys: &[(&str, &str)]| {
         let keys: Vec<_> = keys.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
@@ -89,7 +89,7 @@ fn write(opened: [&Opened; 2], compared: &Compared, outputs: &Outputs<'_>, limit
         let mut backends = Backends::sharing(gpu.clone(), drawing.clone());
         let mut draw = |sides: &[Side], spec: &Spec| {
             let deadline = Deadline::default();
-            opened::draw_difference(opened, compared, sides, spec, &plain, &mut backends, &deadline)
+            drawing::draw_difference(models, compared, sides, spec, &plain, &mut backends, &deadline)
                 .map(|drawn| drawn.image)
                 .map_err(CliError::from)
         };

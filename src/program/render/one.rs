@@ -155,5 +155,6 @@ fn after(stage: Stage) -> &'static str {
         Stage::Plan => "drawing",
         Stage::Render => "encoding",
         Stage::Encode => "writing",
+        _ => "working",
     }
 }

@@ -19,6 +19,7 @@ mod draw_times;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod host;
+mod linear;
 pub mod probe;
 mod recovery;
 pub(crate) mod sample_partition;
@@ -30,7 +31,7 @@ pub use draw_times::{DrawStage, DrawTimes};
 pub use host::GpuHost;
 pub use select::{Backends, Chosen};
 
-use crate::image::{Image, RowSink};
+use crate::image::{Image, LinearImage, RowSink};
 use crate::limits::{Deadline, Stopped};
 use crate::plan::DrawPlan;
 
@@ -50,6 +51,9 @@ pub trait Renderer {
         let _ = sink;
         self.draw(plan, deadline)
     }
+
+    /// The same picture in linear light.
+    fn draw_linear(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<LinearImage, DrawError>;
 
     /// Fills the visibility buffer alone.
     ///

@@ -161,7 +161,7 @@ mod tests {
     use super::super::cpu::CpuRenderer;
     use super::*;
     use crate::backend::BackendKind;
-    use crate::image::Image;
+    use crate::image::{Image, LinearImage};
 
     /// The CPU's pictures, with a fault.
     struct Faulty {
@@ -175,6 +175,10 @@ mod tests {
             let mut rgba = image.rgba.into_vec();
             (self.pixels)(&mut rgba);
             Ok(Image { rgba: rgba.into(), ..image })
+        }
+
+        fn draw_linear(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<LinearImage, DrawError> {
+            CpuRenderer::new(1).draw_linear(plan, deadline)
         }
 
         fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {

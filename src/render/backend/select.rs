@@ -26,9 +26,9 @@ pub struct Backends {
 
 /// A picture and the back-end that drew it.
 #[derive(Debug)]
-pub struct Chosen {
+pub struct Chosen<I = Image> {
     /// The picture.
-    pub image: Image,
+    pub image: I,
     /// The back-end that drew it.
     pub backend: BackendKind,
     /// The durations of its stages, as far as the back-end times them.
@@ -36,6 +36,9 @@ pub struct Chosen {
     /// True if the CPU drew it because a GPU that was chosen could not.
     pub is_substitute: bool,
 }
+
+/// Draws on a back-end.
+type Draw<'a, I> = &'a mut dyn FnMut(&mut dyn Renderer) -> Result<I, DrawError>;
 
 impl Backends {
     /// Renderers for one worker. The CPU path uses up to `threads` threads; no GPU is touched yet.
@@ -64,16 +67,30 @@ impl Backends {
         &mut self,
         choice: BackendChoice,
         plan: &DrawPlan<'_>,
-        sink: Option<&mut dyn RowSink>,
+        mut sink: Option<&mut dyn RowSink>,
         deadline: &Deadline,
     ) -> Result<Chosen, DrawError> {
+        self.draw_by(choice, plan, &mut |renderer| match sink.as_deref_mut() {
+            Some(sink) => renderer.draw_rows(plan, sink, deadline),
+            None => renderer.draw(plan, deadline),
+        })
+    }
+
+    /// Has the back-end that `choice` means here and now draw the plan: calls `draw` with it, and again with another where
+    /// that fails.
+    pub fn draw_by<I>(
+        &mut self,
+        choice: BackendChoice,
+        plan: &DrawPlan<'_>,
+        draw: Draw<'_, I>,
+    ) -> Result<Chosen<I>, DrawError> {
         match choice {
-            BackendChoice::Cpu => self.draw_on_cpu(plan, sink, deadline),
-            BackendChoice::Gpu => self.draw_on_gpu(GpuKind::Any, plan, deadline),
+            BackendChoice::Cpu => self.draw_on_cpu(plan, draw),
+            BackendChoice::Gpu => self.draw_on_gpu(GpuKind::Any, plan, draw),
             BackendChoice::Auto if self.has_gpu() && self.host.costs().prefers_cpu(PlanSize::of(plan)) => {
-                self.draw_on_cpu(plan, sink, deadline)
+                self.draw_on_cpu(plan, draw)
             }
-            BackendChoice::Auto => match self.draw_on_gpu(GpuKind::Hardware, plan, deadline) {
+            BackendChoice::Auto => match self.draw_on_gpu(GpuKind::Hardware, plan, draw) {
                 Ok(chosen) => Ok(chosen),
                 Err(DrawError::Stopped(stopped)) => Err(stopped.into()),
                 Err(error) => {
@@ -82,7 +99,7 @@ impl Backends {
                     if is_substitute {
                         tracing::warn!(%error, "the CPU draws this job");
                     }
-                    Ok(Chosen { is_substitute, ..self.draw_on_cpu(plan, sink, deadline)? })
+                    Ok(Chosen { is_substitute, ..self.draw_on_cpu(plan, draw)? })
                 }
             },
         }
@@ -101,17 +118,9 @@ impl Backends {
         }
     }
 
-    fn draw_on_cpu(
-        &mut self,
-        plan: &DrawPlan<'_>,
-        sink: Option<&mut dyn RowSink>,
-        deadline: &Deadline,
-    ) -> Result<Chosen, DrawError> {
+    fn draw_on_cpu<I>(&mut self, plan: &DrawPlan<'_>, draw: Draw<'_, I>) -> Result<Chosen<I>, DrawError> {
         let draw = || {
-            let image = match sink {
-                Some(sink) => self.cpu.draw_rows(plan, sink, deadline)?,
-                None => self.cpu.draw(plan, deadline)?,
-            };
+            let image = draw(&mut self.cpu)?;
             let draw_times = self.cpu.draw_times();
             Ok::<_, DrawError>(((image, draw_times), draw_times.of(DrawStage::EncodeRows)))
         };
@@ -120,9 +129,14 @@ impl Backends {
     }
 
     /// Draws on the GPU; where that is lost, once more on a fresh one.
-    fn draw_on_gpu(&mut self, kind: GpuKind, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Chosen, DrawError> {
-        let (image, draw_times) = match self.try_gpu(kind, plan, deadline, Attempt::First) {
-            Err(DrawError::DeviceLost(_)) => self.try_gpu(kind, plan, deadline, Attempt::Second)?,
+    fn draw_on_gpu<I>(
+        &mut self,
+        kind: GpuKind,
+        plan: &DrawPlan<'_>,
+        draw: Draw<'_, I>,
+    ) -> Result<Chosen<I>, DrawError> {
+        let (image, draw_times) = match self.try_gpu(kind, plan, draw, Attempt::First) {
+            Err(DrawError::DeviceLost(_)) => self.try_gpu(kind, plan, draw, Attempt::Second)?,
             result => {
                 let drawn = result?;
                 self.host.count_success();
@@ -132,13 +146,13 @@ impl Backends {
         Ok(Chosen { image, backend: BackendKind::Gpu, draw_times, is_substitute: false })
     }
 
-    fn try_gpu(
+    fn try_gpu<I>(
         &mut self,
         kind: GpuKind,
         plan: &DrawPlan<'_>,
-        deadline: &Deadline,
+        draw: Draw<'_, I>,
         attempt: Attempt,
-    ) -> Result<(Image, DrawTimes), DrawError> {
+    ) -> Result<(I, DrawTimes), DrawError> {
         if self.gpu.as_ref().is_some_and(|(_, device)| device.lost().is_some()) {
             // The old renderer would keep a lost device alive.
             drop_catching_panics(self.gpu.take());
@@ -153,7 +167,7 @@ impl Backends {
         }
         let device = found?;
         let host = self.host.clone();
-        let draw = || Ok((self.draw_on(&device, plan, deadline)?, Duration::ZERO));
+        let draw = || Ok((self.draw_on(&device, draw)?, Duration::ZERO));
         let result = host.costs().timed(BackendKind::Gpu, PlanSize::of(plan), draw);
         if let Err(DrawError::DeviceLost(reason)) = &result {
             // Workers that share a device lose it together, which counts as one loss.
@@ -180,12 +194,7 @@ impl Backends {
         })
     }
 
-    fn draw_on(
-        &mut self,
-        device: &Arc<dyn GpuDevice>,
-        plan: &DrawPlan<'_>,
-        deadline: &Deadline,
-    ) -> Result<(Image, DrawTimes), DrawError> {
+    fn draw_on<I>(&mut self, device: &Arc<dyn GpuDevice>, draw: Draw<'_, I>) -> Result<(I, DrawTimes), DrawError> {
         let (mut renderer, device) = match self.gpu.take() {
             Some((renderer, own)) if Arc::ptr_eq(&own, device) => (renderer, own),
             old => {
@@ -194,7 +203,7 @@ impl Backends {
             }
         };
         // wgpu may panic on a lost device.
-        let drawn = catch_unwind(AssertUnwindSafe(|| Ok((renderer.draw(plan, deadline)?, renderer.draw_times()))));
+        let drawn = catch_unwind(AssertUnwindSafe(|| Ok((draw(&mut *renderer)?, renderer.draw_times()))));
         let result = match (drawn, device.lost()) {
             (Ok(result), _) => result,
             (Err(_), Some(reason)) => Err(DrawError::DeviceLost(reason.to_owned())),

@@ -1,13 +1,10 @@
-//! Tests that the shaders and the Rust code beside them agree on constants, structs in buffers,
-//! bindings and entry points.
+//! Tests that the shaders and the Rust code beside them agree on constants and on structs in buffers.
 //!
-//! WGSL has no include and Rust cannot read it, so both sides write these down. The tests parse the
-//! shaders and compare each constant, field and binding. A constant that neither
-//! [`shared_constants`] nor [`SHADER_ONLY`] lists is a failure too.
+//! Rust cannot read WGSL, so both sides write these down. The tests parse the shaders and compare each constant and
+//! field. A constant that neither [`shared_constants`] nor [`SHADER_ONLY`] lists is a failure too.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::mem::offset_of;
-use std::path::Path;
 
 use wgpu::naga;
 
@@ -24,15 +21,16 @@ use super::cpu::occlusion;
 use super::cpu::peeling::tints;
 use super::cpu::surface::{light, texture};
 use super::gpu::params::{Batch, FACES_BACK, FACES_BOTH, FACES_FRONT, Frame, OWN_TRIANGLES, line_flags};
-use super::gpu::pipelines::{Access, Kernel, SampleTarget, SampleWrite, Slot, key};
+use super::gpu::pipelines::key;
+use super::gpu::pipelines::tests::parsed;
 use super::gpu::schedule::sizes::{
     JOBS_MAX, MIXED_HEAD_BYTES, PEEL_STATE_BYTES, STROKES_BYTES, WORK_HEAD_BYTES, WORK_ITEM_BYTES,
 };
 use super::gpu::schedule::{PIECES_MAX, WORKGROUP, line_shares, tiles};
 use super::sample_partition::{GENERATORS, POINTS};
 use crate::plan::{
-    ALPHA_MIN, Edge, HullVertex, LinePass, MIRROR_ROUGHNESS, OutermostSamples, ShadedMaterial, TAPS_PER_PIXEL,
-    TEXTURE_NONE, TINTS, Texture, debug_views, flags, pass_mask, sample_offsets, samplers, slots,
+    ALPHA_MIN, Edge, LinePass, MIRROR_ROUGHNESS, OutermostSamples, ShadedMaterial, TAPS_PER_PIXEL, TEXTURE_NONE, TINTS,
+    Texture, debug_views, flags, pass_mask, sample_offsets, samplers, slots,
 };
 
 /// Every constant that a shader and Rust both have, as the shader calls it.
@@ -193,43 +191,6 @@ const SHADER_ONLY: &[&str] = &[
     "STEP_HARD",
 ];
 
-/// Every kernel in each of its variants.
-fn kernels() -> Vec<Kernel> {
-    let mut all = vec![
-        Kernel::Transform,
-        Kernel::Clip,
-        Kernel::Grid,
-        Kernel::Gather,
-        Kernel::Composite,
-        Kernel::Shade,
-        Kernel::Edge,
-        Kernel::Coverage,
-    ];
-    all.extend([Kernel::Holes, Kernel::Tips, Kernel::LineLight, Kernel::Resolve, Kernel::Paint]);
-    all.extend([Kernel::Breaks, Kernel::Thin, Kernel::MixedPixels, Kernel::MixedColor]);
-    all.extend([Kernel::MixedParts, Kernel::MixedShade, Kernel::MixedSum]);
-    for write in [SampleWrite::Both, SampleWrite::Depth, SampleWrite::Id] {
-        all.push(Kernel::VisibilityFew { write });
-        for target in [SampleTarget::Visibility, SampleTarget::Layer, SampleTarget::Points] {
-            all.extend([Kernel::Visibility { write, target }, Kernel::VisibilityTile { write, target }]);
-        }
-    }
-    // Lists take depth and id together.
-    let (write, target) = (SampleWrite::Both, SampleTarget::Lists);
-    all.extend([Kernel::Visibility { write, target }, Kernel::VisibilityTile { write, target }]);
-    all
-}
-
-/// All kernels, those that gangs share also in the form for gangs.
-fn parsed() -> Vec<(Kernel, naga::Module)> {
-    let parse = |(kernel, is_of_gang): (Kernel, bool)| match naga::front::wgsl::parse_str(&kernel.source(is_of_gang)) {
-        Ok(module) => (kernel, module),
-        Err(error) => panic!("{kernel:?}: {}", error.emit_to_string(&kernel.source(is_of_gang))),
-    };
-    let shared = kernels().into_iter().filter(|kernel| kernel.is_shared()).map(|kernel| (kernel, true));
-    kernels().into_iter().map(|kernel| (kernel, false)).chain(shared).map(parse).collect()
-}
-
 #[test]
 fn constants_of_shaders_and_rust_are_equal() {
     let shared = shared_constants();
@@ -314,7 +275,6 @@ fn layouts() -> Vec<(&'static str, Layout)> {
             }),
         ),
         ("Vertex", layout!(ScreenVertex { x y z inv_w })),
-        ("Vertex", layout!(HullVertex { x y z inv_w })),
     ]
 }
 
@@ -380,193 +340,5 @@ fn is_of_floats(module: &naga::Module, ty: naga::Handle<naga::Type>) -> bool {
             scalar.kind == naga::ScalarKind::Float
         }
         other => panic!("{other:?}"),
-    }
-}
-
-/// Names of slots in the shaders, where these differ from the slots' own names.
-const OTHER_NAMES: &[(Slot, &str)] = &[(Slot::PeelLayer, "base")];
-
-#[test]
-fn kernels_bind_what_their_shaders_declare() {
-    let mut compared = 0;
-    for (kernel, module) in parsed() {
-        let mut declared = BTreeMap::new();
-        for (_, global) in module.global_variables.iter() {
-            let (Some(at), Some(name)) = (global.binding, global.name.as_deref()) else { continue };
-            if at.group == 1 {
-                let naga::AddressSpace::Storage { access } = global.space else { panic!("{name} is no storage") };
-                let is_written = access.contains(naga::StorageAccess::STORE);
-                declared.insert(at.binding, (name, if is_written { Access::ReadWrite } else { Access::Read }));
-            }
-        }
-        let bound = kernel.buffers().iter().map(|&(slot, access)| (slot as u32, (slot, access)));
-        let bound: BTreeMap<u32, (Slot, Access)> = bound.collect();
-        assert!(declared.keys().eq(bound.keys()), "{kernel:?} declares {declared:?} and binds {bound:?}");
-        for (binding, (name, access)) in declared {
-            let (slot, bound_access) = bound[&binding];
-            let is_named = snake_case(&format!("{slot:?}")) == name || OTHER_NAMES.contains(&(slot, name));
-            assert!(is_named && access == bound_access, "{kernel:?}: {name} is bound as {slot:?}, {bound_access:?}");
-            compared += 1;
-        }
-    }
-    assert!(compared > 80, "{compared}");
-}
-
-fn snake_case(name: &str) -> String {
-    let mut out = String::new();
-    for c in name.chars() {
-        if c.is_uppercase() && !out.is_empty() {
-            out.push('_');
-        }
-        out.extend(c.to_lowercase());
-    }
-    out
-}
-
-#[test]
-fn kernels_have_the_entry_points_and_overrides_that_pipelines_name() {
-    for (kernel, module) in parsed() {
-        let entries: Vec<_> = module.entry_points.iter().map(|e| (e.name.as_str(), e.workgroup_size)).collect();
-        let threads = if kernel == Kernel::Edge { line_shares::LINE_THREADS } else { WORKGROUP };
-        assert_eq!(entries, [(kernel.entry(), [threads, 1, 1])], "{kernel:?}");
-        let mut declared: Vec<_> = module.overrides.iter().filter_map(|(_, o)| o.name.as_deref()).collect();
-        let mut given: Vec<_> = kernel.constants(0).into_iter().map(|(name, _)| name).collect();
-        declared.sort_unstable();
-        given.sort_unstable();
-        assert_eq!(declared, given, "{kernel:?}");
-    }
-}
-
-/// Functions of WGSL itself, and its types where they make a value.
-const BUILTINS: &[&str] = &[
-    "abs",
-    "all",
-    "any",
-    "clamp",
-    "countOneBits",
-    "dot",
-    "exp2",
-    "extractBits",
-    "f32",
-    "firstTrailingBit",
-    "floor",
-    "i32",
-    "log2",
-    "max",
-    "min",
-    "select",
-    "sqrt",
-    "storageBarrier",
-    "u32",
-    "u64",
-    "unpack2x16float",
-    "vec2",
-    "vec3",
-    "vec4",
-    "workgroupBarrier",
-    "workgroupUniformLoad",
-];
-
-/// A file of shaders/.
-struct ShaderFile {
-    /// Its text without comments.
-    code: String,
-    /// Its `// Uses:` comment: files, and the names that each group of them defines for this one.
-    uses: Vec<(Vec<String>, Vec<String>)>,
-}
-
-/// The files of a folder and its subfolders, by their path below shaders/.
-fn shader_files(folder: &Path, prefix: &str, files: &mut BTreeMap<String, ShaderFile>) {
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = format!("{prefix}{}", path.file_name().unwrap().to_str().unwrap());
-        if path.is_dir() {
-            shader_files(&path, &format!("{name}/"), files);
-        } else {
-            let text = std::fs::read_to_string(&path).unwrap();
-            let lines = text.lines().map(|line| line.split("//").next().unwrap_or_default());
-            let code = lines.collect::<Vec<_>>().join("\n");
-            files.insert(name.clone(), ShaderFile { code, uses: uses_of(&name, &text) });
-        }
-    }
-}
-
-/// The `// Uses:` comment of a shader: `// Uses: a.wgsl (x, y), b.wgsl or c.wgsl (z).` It may take several lines and
-/// ends with a full stop. `// Uses: nothing.` is the comment of a file that uses no other.
-fn uses_of(name: &str, text: &str) -> Vec<(Vec<String>, Vec<String>)> {
-    let head: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("//")).map(str::trim).collect();
-    let head = head.join(" ");
-    let (_, uses) = head.split_once("Uses: ").unwrap_or_else(|| panic!("{name}: no line `// Uses:`"));
-    let uses = uses.strip_suffix('.').unwrap_or_else(|| panic!("{name}: `// Uses:` is the end of the head comment"));
-    if uses == "nothing" {
-        return Vec::new();
-    }
-    let all = |list: &str, separator: &str| list.split(separator).map(str::to_owned).collect();
-    let groups = uses.strip_suffix(')').unwrap_or_else(|| panic!("{name}: {uses}")).split("), ");
-    let group = |group: &str| {
-        let (files, names) = group.split_once(" (").unwrap_or_else(|| panic!("{name}: {group}"));
-        (all(files, " or "), all(names, ", "))
-    };
-    groups.map(group).collect()
-}
-
-/// The identifiers of some code that are neither fields nor attributes, each with the character after it.
-fn identifiers(code: &str) -> Vec<(&str, char)> {
-    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    let mut found = Vec::new();
-    let (mut rest, mut before) = (code, ' ');
-    while let Some(first) = rest.chars().next() {
-        let length = rest.find(|c| !is_word(c)).unwrap_or(rest.len());
-        if length > 0 && !first.is_ascii_digit() && before != '.' && before != '@' {
-            found.push((&rest[..length], rest[length..].chars().next().unwrap_or(' ')));
-        }
-        let (taken, after) = rest.split_at(length.max(first.len_utf8()));
-        (rest, before) = (after, taken.chars().last().unwrap_or(' '));
-    }
-    found
-}
-
-/// The names that code defines outside of functions.
-fn defined_names(code: &str) -> BTreeSet<&str> {
-    let of_line = |line| {
-        let words = identifiers(line);
-        let keyword = words.iter().position(|(word, _)| ["fn", "struct", "const", "override", "var"].contains(word))?;
-        // `var<storage, read> name`: the words in angle brackets are no names.
-        let is_bracketed = |&&(word, _): &&(&str, char)| {
-            ["storage", "uniform", "workgroup", "private", "read", "read_write"].contains(&word)
-        };
-        words[keyword + 1..].iter().find(|word| !is_bracketed(word)).map(|(name, _)| *name)
-    };
-    code.lines().filter(|line| !line.starts_with([' ', '}'])).filter_map(of_line).collect()
-}
-
-#[test]
-fn shaders_say_which_files_they_use() {
-    let mut files = BTreeMap::new();
-    shader_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"), "", &mut files);
-    assert!(files.len() > 60, "{}", files.len());
-    for (name, file) in &files {
-        let own = defined_names(&file.code);
-        let words = identifiers(&file.code);
-        for (others, used) in &file.uses {
-            for other in others {
-                let Some(other_file) = files.get(other) else { panic!("{name} uses {other}, which does not exist") };
-                let defined = defined_names(&other_file.code);
-                for word in used {
-                    assert!(defined.contains(word.as_str()), "{name} uses {word} of {other}, which has no such name");
-                }
-            }
-            for word in used {
-                assert!(words.iter().any(|(other, _)| other == word), "{name} says that it uses {word}, but does not");
-            }
-        }
-        // Functions, and by their capital letters structs and constants. Buffers look like local variables.
-        let is_builtin = |word: &str| BUILTINS.contains(&word) || word.starts_with("atomic");
-        let is_said = |word: &str| file.uses.iter().any(|(_, used)| used.iter().any(|other| other == word));
-        for (word, next) in words {
-            let is_global = next == '(' || word.starts_with(|c: char| c.is_ascii_uppercase());
-            let is_known = own.contains(word) || is_builtin(word) || is_said(word);
-            assert!(!is_global || is_known, "{name} uses {word}: add it to `// Uses:`, with the file that defines it");
-        }
     }
 }

@@ -10,6 +10,7 @@ pub const DETAIL_CHARS_MAX: usize = 1000;
 
 /// An import that failed. It is always the input's fault; the detail is safe to show to a client.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 #[error("{detail}")]
 pub struct MeshError {
     /// The kind of fault.
@@ -20,6 +21,7 @@ pub struct MeshError {
 
 /// The kinds of fault, each with its own status and stable code at the edge of the program.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum MeshFault {
     /// Not a known mesh format.

@@ -186,11 +186,6 @@ impl Format {
         join(&labels)
     }
 
-    /// All names for a sentence: `obj, gltf ... or 3mf`.
-    pub fn list_names() -> String {
-        join(&Self::names())
-    }
-
     /// The format with a name, in any letter case. `stl` may be either kind: its importer looks.
     pub fn from_name(name: &str) -> Option<Self> {
         FORMATS.iter().find(|entry| entry.name.eq_ignore_ascii_case(name)).map(|entry| entry.format)
@@ -263,7 +258,6 @@ mod tests {
     #[test]
     fn lists_are_sentences() {
         assert_eq!(Format::list(), "OBJ, STL, PLY, OFF, FBX, 3MF, glTF or GLB");
-        assert_eq!(Format::list_names(), "obj, gltf, glb, stl, ply, off, fbx or 3mf");
         assert_eq!((Format::from_name("dae"), Format::from_extension("")), (None, None));
     }
 

@@ -45,6 +45,7 @@ use bundle::{entry, unzip};
 
 /// The mesh formats that are read. The table in `formats` has a row for each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Format {
     /// Wavefront OBJ.
@@ -85,17 +86,6 @@ impl From<Option<Format>> for Options {
     }
 }
 
-/// The result of an import.
-#[derive(Clone, Debug)]
-pub struct Imported {
-    /// The mesh in its normal form.
-    pub mesh: Mesh,
-    /// Counts, repairs, warnings and metadata.
-    pub report: ImportReport,
-    /// The path of the mesh in its bundle.
-    pub path: String,
-}
-
 /// What the process does that importers in C run in.
 #[cfg(feature = "isolate")]
 pub fn answer_in_isolation(head: &[u8], file: &[u8]) -> Vec<u8> {
@@ -108,18 +98,18 @@ pub fn answer_in_isolation(head: &[u8], file: &[u8]) -> Vec<u8> {
     }
 }
 
-/// Reads the mesh of a bundle.
+/// Reads the mesh of a bundle, in its normal form, with the report on its file.
 pub fn import(
     bundle: &Bundle,
     options: impl Into<Options>,
     limits: &Limits,
     budget: &mut Budget,
     deadline: &Deadline,
-) -> Result<Imported, MeshError> {
+) -> Result<(Mesh, ImportReport), MeshError> {
     open(bundle, options.into(), limits, budget, deadline, |raw, cx| {
-        let mut imported = normalise(raw, cx)?;
-        imported.report.warnings.extend(up_axis::warning(&imported.mesh, &imported.report));
-        Ok(imported)
+        let (mesh, mut report) = normalise(raw, cx)?;
+        report.warnings.extend(up_axis::warning(&mesh, &report));
+        Ok((mesh, report))
     })
 }
 
@@ -162,6 +152,7 @@ fn open<T>(
         counts_loose: options.counts_loose,
     };
     let mut raw = (format.entry().read)(bytes, &mut cx)?;
+    (raw.report.path, raw.report.file_bytes) = (folder.entry().path.clone(), bundle.bytes_len());
     if options.time_s.is_some() && !format.entry().has_animations {
         let detail = format!("scene.time_s is given, and {format} files have no animation");
         raw.report.warnings.push(Warning { code: "animation_missing", detail });

@@ -7,6 +7,7 @@ use bytes::Bytes;
 
 /// A mesh as the file has it: file units, f64, nothing welded, nothing dropped.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct RawMesh {
     /// Positions in file space, one per vertex. May hold NaN and infinities: normalisation drops
     /// the faces that use them.
@@ -25,6 +26,7 @@ pub struct RawMesh {
     /// Vertex indices; every one is below `positions.len()`: the importer has checked.
     pub triangles: Vec<[u32; 3]>,
     /// Triangles that share no vertices, in place of `positions` and `triangles`.
+    #[cfg_attr(feature = "isolate", serde(skip))]
     pub soup: Option<Soup>,
     /// As [`crate::mesh::Mesh::edge_masks`], one per triangle.
     pub edge_masks: Vec<u8>,
@@ -37,6 +39,7 @@ pub struct RawMesh {
     /// The images that the materials refer to, still encoded.
     pub images: Vec<ImageSource>,
     /// The file's cameras.
+    #[cfg_attr(feature = "isolate", serde(skip))]
     pub cameras: Vec<FileCamera>,
     /// The axis that points up.
     pub up: UpAxis,

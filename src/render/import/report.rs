@@ -5,9 +5,14 @@ use crate::warning::Warning;
 
 /// Counts, repairs and warnings of one import, and the file's metadata. `inspect` prints them.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct ImportReport {
     /// Format that was read.
     pub format: Format,
+    /// The path of the mesh in its bundle.
+    pub path: String,
+    /// Bytes of all files of the bundle.
+    pub file_bytes: u64,
     /// Vertices in the file, before welding.
     pub file_vertices: u64,
     /// Totals of the file's meshes, shown or not, each counted once. None for all formats but glTF,
@@ -38,6 +43,15 @@ pub struct ImportReport {
 }
 
 impl ImportReport {
+    /// Memory of its lists and texts, bytes.
+    pub fn bytes(&self) -> u64 {
+        let FileMetadata { generator, extensions_used, extensions_required, .. } = &self.metadata;
+        let texts = extensions_used.iter().chain(extensions_required).chain(generator);
+        let of_texts = texts.map(|text| size_of::<String>() + text.len()).sum::<usize>() + self.path.len();
+        let of_warnings = self.warnings.iter().map(Warning::bytes).sum::<usize>();
+        (of_texts + of_warnings + size_of_val(&self.degenerate_places[..])) as u64
+    }
+
     /// Adds loose vertices of a part of the file, if they were counted.
     pub fn add_loose(&mut self, count: Option<u64>) {
         if let Some(count) = count {
@@ -55,6 +69,7 @@ pub fn counted_warnings<const N: usize>(kinds: [(u64, &'static str, &str); N]) -
 
 /// Totals of a file's meshes, as its own accessors count them, each mesh once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct FileContent {
     /// Primitives: parts of a mesh with one material each.
     pub draw_calls: u64,
@@ -70,6 +85,7 @@ pub struct FileContent {
 
 /// Metadata of a file. Counts are None where the format has no such thing.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct FileMetadata {
     /// The program that wrote the file, or the text of its first comment or header.
     pub generator: Option<String>,

@@ -64,6 +64,11 @@ pub fn utf8_or_latin1(name: &[u8]) -> Cow<'_, str> {
     }
 }
 
+/// A number: exactly what [`str::parse`] gives.
+pub fn number(word: &[u8]) -> Option<f64> {
+    fast_float2::parse(word).ok()
+}
+
 /// The bytes without a UTF-8 byte order mark and leading white space.
 pub fn trim_start(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start()

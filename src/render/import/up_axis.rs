@@ -163,9 +163,9 @@ mod tests {
     fn warned(text: &str, up: UpAxis, format: Format) -> bool {
         let limits = Limits::default();
         let bundle = Bundle::of_one(text.as_bytes().to_vec());
-        let imported = import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap();
-        let mesh = Mesh { up, ..imported.mesh };
-        warning(&mesh, &ImportReport { format, ..imported.report }).is_some()
+        let (mesh, report) = import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap();
+        let mesh = Mesh { up, ..mesh };
+        warning(&mesh, &ImportReport { format, ..report }).is_some()
     }
 
     #[test]

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 /// A material of the file. `None` and defaults mean that the file gives no value.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct MaterialSlot {
     /// The name in the file; empty where it gives none.
     pub name: String,
@@ -40,6 +41,7 @@ pub struct MaterialSlot {
 
 /// The meaning of alpha.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub enum AlphaMode {
     /// Nothing: the surface is opaque.
     #[default]
@@ -52,6 +54,7 @@ pub enum AlphaMode {
 
 /// A use of an image by a material.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct TextureRef {
     /// Index into [`Mesh::images`](super::Mesh::images).
     pub image: u32,
@@ -78,6 +81,7 @@ impl TextureRef {
 
 /// Continuation of a texture beyond its edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub enum Wrap {
     /// It starts again.
     #[default]
@@ -90,6 +94,7 @@ pub enum Wrap {
 
 /// An image of the file, still encoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct ImageSource {
     /// Its name in messages: `image 3 ("wood.png")`.
     pub name: String,
@@ -99,6 +104,7 @@ pub struct ImageSource {
 
 /// The bytes of an image, or why there are none.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub enum ImageContent {
     /// The bytes as the file has them, of any encoding.
     Encoded(Arc<[u8]>),

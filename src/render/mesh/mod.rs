@@ -112,6 +112,8 @@ impl Default for ToFile {
 
 /// The axis that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub enum UpAxis {
     /// +X.
     X,
@@ -126,4 +128,18 @@ pub enum UpAxis {
     Z,
     /// -Z.
     NegZ,
+}
+
+impl UpAxis {
+    /// The unit vector along it, in the file's coordinates.
+    pub fn direction(self) -> [f64; 3] {
+        match self {
+            Self::X => [1.0, 0.0, 0.0],
+            Self::NegX => [-1.0, 0.0, 0.0],
+            Self::Y => [0.0, 1.0, 0.0],
+            Self::NegY => [0.0, -1.0, 0.0],
+            Self::Z => [0.0, 0.0, 1.0],
+            Self::NegZ => [0.0, 0.0, -1.0],
+        }
+    }
 }

@@ -10,6 +10,7 @@ pub const POINT_TRIANGLES: u64 = 4;
 
 /// A line segment, or a point: a segment whose ends are the same vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct LineOrPoint {
     /// Indices of the two ends: of the file's vertices during import, of welded positions in a
     /// [`Mesh`](super::Mesh).

@@ -3,8 +3,7 @@
 use super::{Context, RenderError, Stage, Staged, View, with_scene};
 use crate::backend::Renderer as _;
 use crate::plan;
-use crate::scene::Scene;
-use crate::spec::{ProjectionKind, Samples, Spec};
+use crate::spec::{Samples, Spec};
 
 /// The triangle that each pixel of a view shows at its centre, and how far away it is.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,7 +43,10 @@ pub fn find_faces(view: View<'_>, spec: &Spec, cx: &mut Context<'_>) -> Result<F
         // The faces of a layout of the texture are none in space.
         let count = if is_uv_layout { 0 } else { scene.mesh.triangles.len() as u32 };
         let triangle = |word: u64| Some(!(word as u32)).filter(|&id| word != 0 && id < count);
-        let distance = |word: u64| distance(&scene, f32::from_bits((word >> 32) as u32));
+        let distance = |word: u64| {
+            let depth = f64::from(f32::from_bits((word >> 32) as u32));
+            (scene.camera.distance_of(depth) * scene.mesh.to_file.scale) as f32
+        };
         Ok(FaceBuffer {
             width_px: plan.width_px,
             height_px: plan.height_px,
@@ -52,17 +54,4 @@ pub fn find_faces(view: View<'_>, spec: &Spec, cx: &mut Context<'_>) -> Result<F
             depths: words.iter().map(|&word| triangle(word).map_or(f32::INFINITY, |_| distance(word))).collect(),
         })
     })
-}
-
-/// The distance of a reversed depth: the inverse of the third and fourth row of [`Camera::rows`].
-///
-/// [`Camera::rows`]: crate::scene::camera::Camera::rows
-fn distance(scene: &Scene<'_, '_>, depth: f32) -> f32 {
-    let (depth, camera) = (f64::from(depth), &scene.camera);
-    let range = camera.far - camera.near;
-    let units = match camera.kind {
-        ProjectionKind::Perspective => camera.near * camera.far / (depth * range + camera.near),
-        ProjectionKind::Orthographic => camera.far - depth * range,
-    };
-    (units * scene.mesh.to_file.scale) as f32
 }

@@ -46,7 +46,7 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
     lines.extend(primitive_lines);
     let mut surface = surface::surface_pass(scene, &geometry, &mut cx)?;
     let occlusion = surface::occlusion::occlusion_pass(scene, surface.as_ref(), &mut cx);
-    let clipped = Projection::new(camera, scene.size_px(), true);
+    let clipped = Projection::new(camera, scene.size_px());
     let hides = surface.is_some() || groups.has_hull();
     let has_faces = groups.has_hull() || surface.as_ref().is_some_and(|s| s.is_shaded && groups.has_fill());
     let has_opaque = groups.fills().contains(&Fill::Opaque);

@@ -8,9 +8,9 @@ use super::cut_outs::{CutOuts, MaskedFaces, masked};
 use super::edges::face_runs::FaceRuns;
 use super::edges::silhouettes::Silhouettes;
 use super::lines::picked_faces::looked_at;
-use super::prepared::Prepared;
+use super::prepared::{Fact, Prepared};
 use super::skips::{SkipKind, Skips};
-use crate::limits::{Budget, Deadline};
+use crate::limits::{Budget, Deadline, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::{ORIENTATION_BYTES, Orientation, orientation};
@@ -65,19 +65,26 @@ impl<'c> PlanContext<'c> {
         Self { prepared: Some(prepared), ..self }
     }
 
+    /// A fact about the mesh: that of an earlier plan, or else what `find` finds.
+    fn fact<T, E: From<LimitExceeded>>(
+        &mut self,
+        place: fn(&Prepared) -> &Fact<T>,
+        find: impl FnOnce(&mut Budget) -> Result<T, E>,
+    ) -> Result<Arc<T>, E> {
+        match self.prepared {
+            Some(prepared) => place(prepared).get_or_find(self.budget, find),
+            None => Ok(Arc::new(find(self.budget)?)),
+        }
+    }
+
     /// The edges of the mesh, found when a stage first needs them.
     pub fn edges(&mut self, mesh: &Mesh) -> Result<Arc<EdgeList>, PlanError> {
         if let Some(edges) = &self.edges {
             return Ok(Arc::clone(edges));
         }
         self.deadline.check()?;
-        let find = |budget: &mut Budget| EdgeList::of(mesh, budget);
-        let edges = match self.prepared {
-            Some(prepared) => prepared.edges(self.budget, find)?,
-            None => Arc::new(find(self.budget)?),
-        };
-        self.edges = Some(Arc::clone(&edges));
-        Ok(edges)
+        let edges = self.fact(|prepared| &prepared.edges, |budget| EdgeList::of(mesh, budget))?;
+        Ok(Arc::clone(self.edges.insert(edges)))
     }
 
     /// The faces that are looked at for the width of lines, found when a style first needs them.
@@ -86,11 +93,7 @@ impl<'c> PlanContext<'c> {
             return Ok(Arc::clone(looked_at));
         }
         self.deadline.check()?;
-        let find = |budget: &mut Budget| looked_at(mesh, budget);
-        let found = match self.prepared {
-            Some(prepared) => prepared.looked_at(self.budget, find)?,
-            None => Arc::new(find(self.budget)?),
-        };
+        let found = self.fact(|prepared| &prepared.looked_at, |budget| looked_at(mesh, budget))?;
         Ok(Arc::clone(self.looked_at.insert(found)))
     }
 
@@ -101,13 +104,8 @@ impl<'c> PlanContext<'c> {
         }
         let edges = self.edges(mesh)?;
         self.deadline.check()?;
-        let find = |budget: &mut Budget| FaceRuns::of(mesh, &edges, budget);
-        let runs = match self.prepared {
-            Some(prepared) => prepared.face_runs(self.budget, find)?,
-            None => Arc::new(find(self.budget)?),
-        };
-        self.face_runs = Some(Arc::clone(&runs));
-        Ok(runs)
+        let runs = self.fact(|prepared| &prepared.face_runs, |budget| FaceRuns::of(mesh, &edges, budget))?;
+        Ok(Arc::clone(self.face_runs.insert(runs)))
     }
 
     /// The edges of the mesh, and its orientation if they are closed. Another thread may find the
@@ -115,7 +113,7 @@ impl<'c> PlanContext<'c> {
     pub fn edges_and_orientation(&mut self, mesh: &Mesh) -> Result<(Arc<EdgeList>, Option<Orientation>), PlanError> {
         self.budget.spend("the orientation", mesh.positions.len() as u64, ORIENTATION_BYTES)?;
         if let Some(prepared) = self.prepared
-            && let Some(is_closed) = prepared.known_edges().map(EdgeList::is_closed)
+            && let Some(is_closed) = prepared.edges.known().map(EdgeList::is_closed)
         {
             let edges = self.edges(mesh)?;
             return Ok((edges, is_closed.then(|| prepared.orientation(|| orientation(mesh)))));
@@ -148,11 +146,7 @@ impl<'c> PlanContext<'c> {
         }
         let deadline = self.deadline;
         let find = |budget: &mut Budget| CutOuts::of(scene.mesh, budget, deadline);
-        let found = match self.prepared {
-            Some(prepared) => prepared.cut_outs(self.budget, find)?,
-            None => Arc::new(find(self.budget)?),
-        };
-        Ok(Some((found, masked)))
+        Ok(Some((self.fact(|prepared| &prepared.cut_outs, find)?, masked)))
     }
 
     /// The edges of the mesh, and which of them may be silhouette edges. Contours and hulls share

@@ -26,7 +26,7 @@ pub fn framing(
     if masked.is_empty() {
         return Ok(None);
     }
-    let cut_outs = prepared.cut_outs(budget, |budget| CutOuts::of(mesh, budget, deadline))?;
+    let cut_outs = prepared.cut_outs.get_or_find(budget, |budget| CutOuts::of(mesh, budget, deadline))?;
     let is_absent =
         |face: usize| masked.get(mesh.triangle_materials[face] as usize) == Some(&true) && cut_outs.is_absent(face);
     if !(0..mesh.triangles.len()).any(is_absent) {

@@ -10,7 +10,7 @@
 use super::DrawPlan;
 use super::context::{CHECK_EVERY, PlanContext};
 use super::geometry::Geometry;
-use super::projection::{Projection, row_dot};
+use super::projection::{PX, Projection, Projector};
 use super::skips::SkipKind;
 use crate::limits::{Deadline, Stopped};
 use crate::scene::Scene;
@@ -19,7 +19,7 @@ use crate::spec::ProjectionKind;
 
 /// Distance from the picture's border from which a mesh counts as inside, 1/256 px: lines look a
 /// pixel beside an edge too, and vertices are snapped.
-const INSIDE: f64 = 2.0 * 256.0;
+const INSIDE: f64 = 2.0 * PX;
 
 /// Distance from there, 1/256 px, up to which positions are looked at one by one.
 const SURE: f64 = 64.0;
@@ -52,15 +52,16 @@ pub fn margin_px(
 /// the camera cannot tell alone.
 fn is_inside(scene: &Scene<'_, '_>, geometry: &Geometry<'_>, deadline: &Deadline) -> Result<bool, Stopped> {
     let size_px = scene.size_px();
-    let projection = Projection::new(&scene.camera, size_px, true);
+    let projector = Projector::new(&Projection::new(&scene.camera, size_px));
+    let near_w = projector.near_w(0.0);
     let half = size_px.map(|size| 128.0 * f64::from(size) - INSIDE);
     let known = if is_surely_inside(&scene.camera, size_px) { scene.mesh.positions.len() } else { 0 };
     let others = geometry.positions.get(known..).unwrap_or_default();
     for positions in others.chunks(CHECK_EVERY) {
         deadline.check()?;
         let is_inside = |p: &[f32; 3]| {
-            let [x, y, w] = [&projection.x, &projection.y, &projection.w].map(|row| row_dot(row, *p));
-            w >= f64::from(projection.near_w) && x.abs() <= half[0] * w && y.abs() <= half[1] * w
+            let [x, y, w] = projector.place(*p);
+            w >= near_w && x.abs() <= half[0] * w && y.abs() <= half[1] * w
         };
         if !positions.iter().all(is_inside) {
             return Ok(false);

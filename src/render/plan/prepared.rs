@@ -19,14 +19,22 @@ use crate::texture::kept::KeptTextures;
 #[derive(Debug, Default)]
 pub struct Prepared {
     token: Arc<MeshToken>,
-    edges: OnceLock<(Arc<EdgeList>, Vec<Spent>)>,
+    /// The edges.
+    pub(super) edges: Fact<EdgeList>,
     orientation: OnceLock<Orientation>,
-    looked_at: OnceLock<(Arc<Vec<u32>>, Vec<Spent>)>,
-    face_runs: OnceLock<(Arc<FaceRuns>, Vec<Spent>)>,
-    cut_outs: OnceLock<(Arc<CutOuts>, Vec<Spent>)>,
+    /// The faces that are looked at for the width of lines.
+    pub(super) looked_at: Fact<Vec<u32>>,
+    /// The runs of faces.
+    pub(super) face_runs: Fact<FaceRuns>,
+    /// Visible parts of the faces with cut-out textures.
+    pub(super) cut_outs: Fact<CutOuts>,
     vertex_normals: Mutex<Option<VertexNormals>>,
     textures: KeptTextures,
 }
+
+/// A fact about a mesh, once it is found, and what finding it took.
+#[derive(Debug)]
+pub struct Fact<T>(OnceLock<(Arc<T>, Vec<Spent>)>);
 
 /// Vertex normals of a mesh that brings none.
 #[derive(Clone, Debug)]
@@ -52,53 +60,12 @@ impl Prepared {
         Arc::clone(&self.token)
     }
 
-    /// The edges, paid for; found by `find` if they are not known.
-    pub fn edges(
-        &self,
-        budget: &mut Budget,
-        find: impl FnOnce(&mut Budget) -> Result<EdgeList, LimitExceeded>,
-    ) -> Result<Arc<EdgeList>, LimitExceeded> {
-        kept(&self.edges, budget, find)
-    }
-
-    /// The runs of faces, paid for; found by `find` if they are not known.
-    pub fn face_runs(
-        &self,
-        budget: &mut Budget,
-        find: impl FnOnce(&mut Budget) -> Result<FaceRuns, LimitExceeded>,
-    ) -> Result<Arc<FaceRuns>, LimitExceeded> {
-        kept(&self.face_runs, budget, find)
-    }
-
-    /// Visible parts of the faces with cut-out textures, paid for; found by `find` if it is not known.
-    pub fn cut_outs<E: From<LimitExceeded>>(
-        &self,
-        budget: &mut Budget,
-        find: impl FnOnce(&mut Budget) -> Result<CutOuts, E>,
-    ) -> Result<Arc<CutOuts>, E> {
-        kept(&self.cut_outs, budget, find)
-    }
-
-    /// The edges, if they are known.
-    pub fn known_edges(&self) -> Option<&EdgeList> {
-        self.edges.get().map(|(edges, _)| &**edges)
-    }
-
     /// The orientation of the faces.
     pub fn orientation(&self, find: impl FnOnce() -> Orientation) -> Orientation {
         self.orientation.get().copied().unwrap_or_else(|| {
             let found = find();
             *self.orientation.get_or_init(|| found)
         })
-    }
-
-    /// The faces that are looked at for the width of lines, paid for; found by `find` if they are not known.
-    pub fn looked_at(
-        &self,
-        budget: &mut Budget,
-        find: impl FnOnce(&mut Budget) -> Result<Vec<u32>, LimitExceeded>,
-    ) -> Result<Arc<Vec<u32>>, LimitExceeded> {
-        kept(&self.looked_at, budget, find)
     }
 
     /// Vertex normals for a mesh that brings none, with creases, paid for; found by `find` if those that
@@ -128,11 +95,11 @@ impl Prepared {
 
     /// Memory of what is kept, bytes.
     pub fn bytes(&self) -> u64 {
-        let edges = self.edges.get().map_or(0, |(edges, _)| edges.bytes());
+        let edges = self.edges.known().map_or(0, EdgeList::bytes);
         let normals = self.locked_normals().as_ref().map_or(0, VertexNormals::bytes);
-        let looked_at = self.looked_at.get().map_or(0, |(faces, _)| size_of_val(&faces[..]));
-        let runs = self.face_runs.get().map_or(0, |(runs, _)| runs.bytes());
-        let cut_outs = self.cut_outs.get().map_or(0, |(cut_outs, _)| cut_outs.bytes());
+        let looked_at = self.looked_at.known().map_or(0, |faces| size_of_val(&faces[..]));
+        let runs = self.face_runs.known().map_or(0, FaceRuns::bytes);
+        let cut_outs = self.cut_outs.known().map_or(0, CutOuts::bytes);
         (edges + normals + looked_at + runs + cut_outs) as u64 + self.textures.bytes()
     }
 
@@ -141,19 +108,32 @@ impl Prepared {
     }
 }
 
-/// The content of a place, paid for; found by `find`, and kept, if there is none.
-fn kept<T, E: From<LimitExceeded>>(
-    place: &OnceLock<(Arc<T>, Vec<Spent>)>,
-    budget: &mut Budget,
-    find: impl FnOnce(&mut Budget) -> Result<T, E>,
-) -> Result<Arc<T>, E> {
-    if let Some((found, spent)) = place.get() {
-        budget.spend_again(spent)?;
-        return Ok(Arc::clone(found));
+impl<T> Fact<T> {
+    /// The fact, paid for; found by `find`, and kept, if it is not known.
+    pub fn get_or_find<E: From<LimitExceeded>>(
+        &self,
+        budget: &mut Budget,
+        find: impl FnOnce(&mut Budget) -> Result<T, E>,
+    ) -> Result<Arc<T>, E> {
+        if let Some((found, spent)) = self.0.get() {
+            budget.spend_again(spent)?;
+            return Ok(Arc::clone(found));
+        }
+        let (found, spent) = budget.record(find);
+        let found = Arc::new(found?);
+        Ok(Arc::clone(&self.0.get_or_init(|| (found, spent)).0))
     }
-    let (found, spent) = budget.record(find);
-    let found = Arc::new(found?);
-    Ok(Arc::clone(&place.get_or_init(|| (found, spent)).0))
+
+    /// The fact, if it is known.
+    pub fn known(&self) -> Option<&T> {
+        self.0.get().map(|(found, _)| &**found)
+    }
+}
+
+impl<T> Default for Fact<T> {
+    fn default() -> Self {
+        Self(OnceLock::new())
+    }
 }
 
 impl VertexNormals {

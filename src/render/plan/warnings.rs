@@ -50,6 +50,7 @@ pub fn is_out_of_view(plan: &DrawPlan<'_>) -> bool {
         return false;
     }
     let half = [plan.width_px, plan.height_px].map(|size| 128.0 * size as f32 + 256.0 * reach_px(plan));
+    // As the back-ends round it: what is said to be blank is.
     let row = |row: [f32; 4], v: [f32; 3]| ((row[0] * v[0] + row[1] * v[1]) + row[2] * v[2]) + row[3];
     let distances = |v: u32| {
         let v = plan.positions[v as usize];

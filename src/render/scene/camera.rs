@@ -153,6 +153,27 @@ impl Camera {
         f64::from(size_px[1]) * 0.5 / (self.half_size.y * w)
     }
 
+    /// A position in the camera's axes.
+    pub fn in_axes(&self, position: [f32; 3]) -> DVec3 {
+        let p = DVec3::from(position.map(f64::from));
+        DVec3::from(self.axes.map(|axis| axis.dot(p)))
+    }
+
+    /// W of a point in the camera's axes.
+    pub fn w(&self, at: DVec3) -> f64 {
+        if self.kind == Kind::Perspective { self.distance - at.z } else { 1.0 }
+    }
+
+    /// The distance along the view's axis of what has a reversed depth: the inverse of the third and fourth row of
+    /// [`Camera::rows`].
+    pub fn distance_of(&self, depth: f64) -> f64 {
+        let range = self.far - self.near;
+        match self.kind {
+            Kind::Perspective => self.near * self.far / (depth * range + self.near),
+            Kind::Orthographic => self.far - depth * range,
+        }
+    }
+
     /// The four rows of the projection: x, y (in 1/256 px from the centre), reversed depth, W.
     pub fn rows(&self, size_px: [u32; 2]) -> [[f32; 4]; 4] {
         let [right, up, back] = self.axes;

@@ -5,6 +5,7 @@ use crate::mesh::UpAxis;
 
 word_enums! {
     /// Named directions to look from.
+    #[non_exhaustive]
     pub enum NamedView {
         /// From the front, a little from the right and from above: azimuth 30 degrees, elevation 20.
         Auto = "auto",

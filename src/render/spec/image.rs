@@ -25,6 +25,7 @@ pub struct ImageSpec {
 
 /// Visibility samples per pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Samples {
     /// 1, 4, 8 or 16.
     Fixed(u32),

@@ -130,6 +130,7 @@ impl Default for Surface {
 
 word_enums! {
     /// Edges that a wire follows.
+    #[non_exhaustive]
     pub enum WireEdges {
         /// Every triangle's edges.
         Triangles = "triangles",
@@ -143,6 +144,7 @@ word_enums! {
     }
 
     /// The treatment of edges behind a surface.
+    #[non_exhaustive]
     pub enum Hidden {
         /// Not drawn.
         Hide = "hide",

@@ -10,7 +10,7 @@ use crate::guard::{Panicked, guarded};
 use crate::srgb::srgb_to_linear;
 use crate::texture::TextureError;
 use crate::texture::basis::{self, BasisHeader, KTX2_MAGIC};
-use crate::texture::png::{self, CriticalChunks};
+use crate::texture::png::CriticalChunks;
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Limits};
 
 /// The size of an image and the cost of decoding it, from its first bytes.
@@ -118,18 +118,6 @@ fn read_pixels(name: &str, bytes: &[u8], header: &Header) -> Result<Pixels, Text
     let mut pixels = vec![0; decoder.total_bytes() as usize];
     decoder.read_image(&mut pixels).map_err(|error| fault(name, &error))?;
     Ok(Pixels { width, height, channels, is_wide, bytes: pixels })
-}
-
-/// Finds faults without decoding: those of the header, and false checksums. Pixels may be broken beyond
-/// that.
-pub fn check(name: &str, bytes: &[u8]) -> Result<Header, TextureError> {
-    let header = header(name, bytes)?;
-    match header.encoding {
-        Encoding::Picture(ImageFormat::Png) if !png::is_whole(bytes) => Err(TextureError::Broken(format!(
-            "{name} of the mesh is damaged: a checksum is false, or its end is missing"
-        ))),
-        _ => Ok(header),
-    }
 }
 
 impl Header {

@@ -6,25 +6,8 @@
 
 use std::io::{self, BufRead, Read, Seek, SeekFrom};
 
-/// True if each chunk that changes pixels is there, up to the last, with a checksum that is right. ISO/IEC
-/// 15948, 5.3.
-pub fn is_whole(bytes: &[u8]) -> bool {
-    let mut chunks = CriticalChunks::new(bytes);
-    loop {
-        chunks.current = &[];
-        chunks.advance();
-        let Some((body, crc)) = chunks.current.get(4..).and_then(<[u8]>::split_last_chunk) else { return false };
-        if body.len() < 4 || crc32fast::hash(body) != u32::from_be_bytes(*crc) {
-            return false;
-        }
-        if body.starts_with(b"IEND") {
-            return true;
-        }
-    }
-}
-
 /// Reads a PNG's signature, its critical chunks and `tRNS`, the one ancillary chunk that changes
-/// pixels.
+/// pixels. Its buffer is the unread rest of the signature or of one whole chunk.
 #[derive(Debug)]
 pub struct CriticalChunks<'b> {
     /// Unread bytes of the signature or of the current chunk.

@@ -257,6 +257,8 @@ fn toml_text(value: &toml::Value) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::{BTreeMap, BTreeSet};
+
     use super::*;
 
     #[test]
@@ -275,11 +277,24 @@ mod tests {
 
     #[test]
     fn every_limit_has_its_flag() {
-        let flags = SETTINGS.iter().filter(|s| s.key.starts_with("limit-")).count();
-        // All are numbers, so that debug output has a colon for each.
-        let limits = format!("{:?}", Limits::default()).matches(": ").count();
-        // Those of a body and of a job's time concern the service alone.
-        assert_eq!((limits, flags), (9, limits + 2), "a limit without a flag, or a flag without a limit");
+        // All limits are numbers, so that debug output has `name: number` for each.
+        let values = |limits: &Limits| -> BTreeMap<String, String> {
+            let text = format!("{limits:?}").replace(['{', '}', ','], "\n");
+            let pairs = text.lines().filter_map(|line| line.trim().split_once(": "));
+            pairs.map(|(name, value)| (name.to_owned(), value.to_owned())).collect()
+        };
+        let mut with_flags = BTreeSet::new();
+        for setting in SETTINGS.iter().filter(|setting| setting.has_flag) {
+            let Some(name) = setting.key.strip_prefix("limit-").map(|key| key.replace('-', "_")) else { continue };
+            let mut config = Config::default();
+            setting.set(&mut config, "77").unwrap();
+            // Those of a body and of a job's time concern the service alone.
+            if !["body_bytes", "job_ms"].contains(&name.as_str()) {
+                assert_eq!(values(&config.limits)[&name], "77", "{} sets another limit", setting.key);
+                with_flags.insert(name);
+            }
+        }
+        assert!(values(&Limits::default()).into_keys().eq(with_flags), "a limit without a flag");
     }
 
     #[test]

@@ -61,3 +61,23 @@ pub fn render_key(state: &AppState, digest: Digest, reading: &Reading, spec: &Sp
     let weak = if may_be_gpu { "W/" } else { "" };
     format!("{weak}\"{}\"", Digest::of(key.as_bytes()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use percent_encoding::percent_decode_str;
+
+    #[test]
+    fn a_query_keeps_unreserved_characters_and_those_of_vectors_and_names() {
+        for byte in 0..=0x7f_u8 {
+            let text = char::from(byte).to_string();
+            let escaped = utf8_percent_encode(&text, ESCAPED).to_string();
+            let is_kept = byte.is_ascii_alphanumeric() || b"-._~,:/".contains(&byte);
+            assert_eq!(escaped, if is_kept { text } else { format!("%{byte:02X}") });
+        }
+        let text = "käse & wein=100%+#?.glb";
+        let escaped = utf8_percent_encode(text, ESCAPED).to_string();
+        assert_eq!(escaped, "k%C3%A4se%20%26%20wein%3D100%25%2B%23%3F.glb");
+        assert_eq!(percent_decode_str(&escaped).decode_utf8().unwrap(), text);
+    }
+}

@@ -353,6 +353,8 @@ impl Timings {
             Stage::Plan => &mut self.plan,
             Stage::Render | Stage::Judge => &mut self.render,
             Stage::Encode => &mut self.encode,
+            // No field has its time.
+            _ => return,
         } += took;
     }
 

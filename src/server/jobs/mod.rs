@@ -362,11 +362,6 @@ impl Jobs {
         self.registry.load()
     }
 
-    /// Most bytes of kept results.
-    pub fn result_limit_bytes(&self) -> u64 {
-        self.registry.settings.result_bytes
-    }
-
     /// Refuses new work from now on. Accepted jobs go on.
     pub fn drain(&self) {
         self.registry.drain();

@@ -52,12 +52,13 @@ impl Progress {
     pub fn after(self, stage: Stage) -> Self {
         match stage {
             Stage::Parse => Self { step: Step::Drawing, ..self },
-            Stage::Plan | Stage::Encode => self,
             Stage::Render | Stage::Judge => {
                 let drawn = self.drawn.saturating_add(1).min(self.views);
                 let step = if drawn == self.views { Step::Encoding } else { Step::Drawing };
                 Self { step, drawn, ..self }
             }
+            // Other stages end no step.
+            _ => self,
         }
     }
 }

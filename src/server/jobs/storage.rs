@@ -131,7 +131,8 @@ fn of_picture(finished: &Finished, hold: &Hold) -> PictureRecord {
     let selection = finished.selection.as_ref().map(|selection| SelectionRecord {
         samples: match selection.samples {
             Samples::Fixed(samples) => samples,
-            Samples::Adaptive => 0,
+            // `read_picture` reads it as adaptive, the only other kind.
+            _ => 0,
         },
         wire_methods: selection.wire_methods.iter().map(|&method| method.to_owned()).collect(),
         backend: word_for(selection.backend).to_owned(),

@@ -13,10 +13,8 @@ use crate::priority;
 use crate::residents::{FoundMesh, Residents};
 use crate::telemetry::traces;
 use meshsnap_inspect::check::{self, Verdict};
-use meshsnap_inspect::{
-    opened,
-    report::{self, Extras},
-};
+use meshsnap_inspect::report::{self, Extras};
+use meshsnap_inspect::{diff, drawing, read};
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::backend::{Backends, GpuHost};
 use meshsnap_render::encode::EncodeError;
@@ -106,19 +104,20 @@ fn render_stored(
     // Exact, and different for 0 and -0.
     let key = time_s.map_or_else(|| key.to_owned(), |time_s| format!("{key} at {time_s:?} s"));
     let FoundMesh { resident, was_kept } = residents.find(&key, deadline, || {
-        let mut budget = Budget::lent(limits, lender.clone());
+        let budget = Budget::lent(limits, lender.clone());
         let options = import::Options { format: job.format_in, time_s, ..import::Options::default() };
-        let model = Model::read(&job.bundle, options, limits, &mut budget, deadline)?;
+        let model = Model::read(&job.bundle, options, limits, budget, deadline)?;
         // From here on it is the memory of a mesh that is kept, if there is room for it.
         if let Some(lender) = lender {
             lender.restart();
         }
-        Ok((model, budget.lent_by(None, 0)))
+        Ok(model)
     })?;
     ended(Stage::Parse);
     // A mesh that is kept has a share of its own.
-    let counted = if resident.is_counted() { resident.budget.spent_bytes() } else { 0 };
-    let budget = resident.budget.lent_by(lender.clone(), counted);
+    let spent = resident.model.budget();
+    let counted = if resident.is_counted() { spent.spent_bytes() } else { 0 };
+    let budget = spent.lent_by(lender.clone(), counted);
     let context = Context { backends, budget, deadline, ended };
     let output = pipeline::render_model(&resident.model, job.spec, context);
     residents.weigh(&key, &resident);
@@ -139,13 +138,13 @@ fn judge(
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Product, RenderError> {
     let Work { bundle, format_in, .. } = work;
-    let opened = opened::open(bundle, *format_in, limits, work.budget(limits), deadline);
+    let model = read(bundle, *format_in, limits, work.budget(limits), deadline);
     ended(Stage::Parse);
     let file = bundle.files().first().filter(|_| bundle.files().len() == 1 && !bundle.is_zip());
     let named = bundle.entry().or(file.map(|file| file.path.as_str()));
-    let path = opened.as_ref().map_or(named.unwrap_or(UNNAMED), |opened| opened.path()).to_owned();
+    let path = model.as_ref().map_or(named.unwrap_or(UNNAMED), |model| &model.report().path).to_owned();
     let options = check::Options { all_places: checking.all_places, fails_at_limits: false };
-    let checks = match opened.and_then(|opened| opened.check(&checking.rules, options, deadline)) {
+    let checks = match model.and_then(|model| check::check(&model, &checking.rules, options, deadline)) {
         Ok(checks) => checks,
         Err(error) => vec![check::of_unreadable(&error).ok_or(error)?],
     };
@@ -166,11 +165,11 @@ fn compare(
     let Comparing { newer, max_distance, picture, may_fail } = comparing;
     let open = |bundle: &Bundle, side: &str| {
         let about = |error: MeshError| MeshError { detail: format!("{side}: {}", error.detail), ..error };
-        opened::open(bundle, work.format_in, limits, work.budget(limits), deadline).map_err(about)
+        read(bundle, work.format_in, limits, work.budget(limits), deadline).map_err(about)
     };
     let (a, b) = (open(&work.bundle, "a")?, open(&newer.bundle, "b")?);
     ended(Stage::Parse);
-    let compared = a.diff(&b, *max_distance, deadline)?;
+    let compared = diff::compare(&a, &b, *max_distance, deadline)?;
     let Some(spec) = picture else {
         ended(Stage::Judge);
         let has_failed = *may_fail && !compared.difference.same;
@@ -178,7 +177,7 @@ fn compare(
     };
     // Comparing takes the place of planning.
     ended(Stage::Plan);
-    let output = opened::render_difference([&a, &b], &compared, spec, backends, deadline, ended)?;
+    let output = drawing::render_difference([&a, &b], &compared, spec, backends, deadline, ended)?;
     Ok(Product::Picture { output: Box::new(output), mesh_was_kept: false })
 }
 

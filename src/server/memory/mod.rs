@@ -148,7 +148,8 @@ impl Memory {
         Arc::new(Self { all: limits.all, job, caps, state: Mutex::default(), caches: RwLock::default() })
     }
 
-    /// A budget that refuses nothing but what is beyond the cap of an account.
+    /// For tests: a budget that refuses nothing but what is beyond the cap of an account.
+    #[cfg(test)]
     pub fn unlimited(accounts: &[(Account, u64)]) -> Arc<Self> {
         Self::new(&MemoryLimits { all: u64::MAX / 2, job: u64::MAX / 4, accounts: accounts.to_vec() })
     }

@@ -7,7 +7,7 @@ use meshsnap_render::backend::cpu::CpuRenderer;
 use meshsnap_render::backend::{DrawError, Renderer as _};
 use meshsnap_render::encode;
 use meshsnap_render::image::{DEFAULT_EFFORT, Image, ImageFormat};
-use meshsnap_render::import::{Bundle, Imported};
+use meshsnap_render::import::Bundle;
 use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_render::mesh::Mesh;
 use meshsnap_render::plan::{self, DrawPlan};
@@ -111,10 +111,7 @@ fn limits() -> Limits {
 /// A mesh.
 pub fn import(bundle: &Bundle) -> Mesh {
     let limits = limits();
-    let Imported { mesh, .. } =
-        meshsnap_render::import::import(bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default())
-            .unwrap();
-    mesh
+    meshsnap_render::import::import(bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap().0
 }
 
 /// A request of 512 x 512 px from the view `iso`, unless the keys say otherwise.

@@ -17,13 +17,12 @@ use std::f64::consts::TAU;
 
 fn report(bytes: &[u8]) -> (Value, String) {
     let Read { mesh, report } = read(bytes).unwrap();
-    let report = of(&mesh, &report, bytes.len() as u64);
+    let report = of(&mesh, &report);
     (serde_json::to_value(&report).unwrap(), report.text())
 }
 
-fn of(mesh: &Mesh, import: &ImportReport, bytes: u64) -> Report {
-    Report::of(mesh, import, bytes, Extras::default(), &mut Budget::new(&Limits::default()), &Deadline::default())
-        .unwrap()
+fn of(mesh: &Mesh, import: &ImportReport) -> Report {
+    Report::of(mesh, import, Extras::default(), &mut Budget::new(&Limits::default()), &Deadline::default()).unwrap()
 }
 
 /// Area and volume.
@@ -240,7 +239,7 @@ fn many_hostile_triangles_are_counted_in_linear_memory() {
         let mesh = mesh_of(triangles);
         // Linear in the triangles, whatever their shape.
         let most = COUNTING_BYTES * mesh.triangles.len() as u64;
-        let given = within_bytes(most, name, || serde_json::to_value(of(&mesh, &ImportReport::default(), 0)).unwrap());
+        let given = within_bytes(most, name, || serde_json::to_value(of(&mesh, &ImportReport::default())).unwrap());
         let t = &given["topology"];
         let count = |key: &str| t[key].as_u64().unwrap();
         let n = u64::from(n);
@@ -275,11 +274,11 @@ fn a_poor_budget_and_a_raised_flag_stop_the_report() {
     stopped.stop();
     assert!(Topology::of(&mesh, &edges, &mut Budget::new(&Limits::default()), &stopped).is_err());
     assert!(
-        Report::of(&mesh, &mesh.report, 0, Extras::default(), &mut Budget::new(&Limits::default()), &stopped).is_err()
+        Report::of(&mesh, &mesh.report, Extras::default(), &mut Budget::new(&Limits::default()), &stopped).is_err()
     );
     let needed = (0..10_000).find(|&memory_bytes| {
         let limits = Limits::default().with(|limits| limits.memory_bytes = memory_bytes);
-        Report::of(&mesh, &mesh.report, 0, Extras::default(), &mut Budget::new(&limits), &Deadline::default()).is_ok()
+        Report::of(&mesh, &mesh.report, Extras::default(), &mut Budget::new(&limits), &Deadline::default()).is_ok()
     });
     assert!(needed.is_some_and(|bytes| bytes > 500), "{needed:?}");
 }

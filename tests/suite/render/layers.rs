@@ -11,7 +11,7 @@ use meshsnap_render::limits::Deadline;
 use meshsnap_render::plan::{DrawPlan, Faces, PeelingPass, ShadedMaterial, SurfacePass, flags, pass_mask};
 
 use crate::support::families::soups::{KINDS, Kind, Random, Soup, View};
-use crate::support::gpus::gpus;
+use crate::support::gpus::{gpus, gpus_of_case};
 use crate::support::likeness::{Likeness, Tolerance};
 use crate::support::truth;
 
@@ -187,7 +187,7 @@ fn pictures_with_layers_agree() {
                     assert!(cpu.rgba == other.draw(&plan, &Deadline::default()).unwrap().rgba, "{what}");
                 }
                 // One of the devices in turn; all of them in a long run.
-                for gpu in gpus().into_iter().flatten().skip(truth::cases(cases % 2, 0)).take(truth::cases(1, 2)) {
+                for gpu in gpus_of_case(cases) {
                     let mut renderer = GpuRenderer::new(gpu.clone());
                     // Twice: the second picture comes from buffers that the first has used.
                     for _ in 0..2 {

@@ -1,4 +1,5 @@
-//! Every real mesh in every style on both back-ends: drawn, the right size, not blank, and alike.
+//! Every real mesh in every style on the CPU: drawn, the right size, not blank. The GPU draws every third of the
+//! pictures (all in a long run), and they are alike.
 //!
 //! `MESHSNAP_CONTACT_SHEET=FILE.png` also stores them all in one picture, to be looked at.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers

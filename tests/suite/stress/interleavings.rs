@@ -9,7 +9,7 @@ use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::import::Bundle;
 use meshsnap_render::limits::Limits;
 use meshsnap_server::jobs::{CpuThreads, Job, JobSettings, JobState, Jobs, Owner, Task, Work, pipeline_renderers};
-use meshsnap_server::memory::{Account, Memory};
+use meshsnap_server::memory::{Account, Memory, MemoryLimits};
 use meshsnap_server::residents::Residents;
 
 use crate::support::fake_gpus::{Machine, Open};
@@ -46,7 +46,7 @@ struct Process {
 impl Process {
     fn start() -> Self {
         let machine = Machine::new(&[Open::Hardware; 2 * ROUNDS], &[]);
-        let memory = Memory::unlimited(&[]);
+        let memory = Memory::new(&MemoryLimits { all: u64::MAX / 2, job: u64::MAX / 4, accounts: Vec::new() });
         let residents = Arc::new(Residents::new(RESIDENT_BYTES, memory.clone()));
         let threads = CpuThreads::Shared(Arc::new(DrawingThreads::new(2)));
         let gpu = machine.host(HardwareHint::Maybe);

@@ -8,7 +8,7 @@ use std::time::Duration;
 use meshsnap_render::backend::cpu::CpuRenderer;
 use meshsnap_render::backend::gpu::{GpuInfo, GpuKind};
 use meshsnap_render::backend::{BackendKind, CostModel, DrawError, GpuDevice, GpuHost, HardwareHint, Opener, Renderer};
-use meshsnap_render::image::Image;
+use meshsnap_render::image::{Image, LinearImage};
 use meshsnap_render::limits::Deadline;
 use meshsnap_render::plan::DrawPlan;
 
@@ -154,6 +154,10 @@ impl GpuDevice for Fake {
 struct FakeRenderer(Arc<Fake>);
 
 impl Renderer for FakeRenderer {
+    fn draw_linear(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<LinearImage, DrawError> {
+        CpuRenderer::new(1).draw_linear(plan, deadline)
+    }
+
     fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
         let fake = &self.0;
         let gone = || DrawError::DeviceLost(fake.lost.get_or_init(|| "pulled out".into()).clone());

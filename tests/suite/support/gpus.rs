@@ -6,6 +6,7 @@ use meshsnap_render::backend::DrawError;
 use meshsnap_render::backend::gpu::{AtomicsChoice, Gpu, GpuKind};
 
 use super::skip::{Need, skip};
+use super::truth::is_long;
 
 /// The GPU with 64-bit atomics (where it has them) and without. None, and the test counts as
 /// skipped, where there is no Vulkan.
@@ -17,6 +18,16 @@ pub fn gpus() -> Option<&'static [Arc<Gpu>; 2]> {
         skip(Need::Gpu, "Vulkan");
     }
     opened.as_ref()
+}
+
+/// The GPUs that draw a test's case of this number: one in turn, or both in a long run.
+#[track_caller]
+pub fn gpus_of_case(number: usize) -> &'static [Arc<Gpu>] {
+    match gpus() {
+        None => &[],
+        Some(both) if is_long() => both,
+        Some(both) => std::slice::from_ref(&both[number % 2]),
+    }
 }
 
 /// As [`gpus`], and no other test draws on them.

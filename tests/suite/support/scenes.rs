@@ -209,7 +209,7 @@ pub fn mesh_of(bytes: &[u8]) -> Result<Mesh, meshsnap_render::import::MeshError>
         &mut Budget::new(&limits),
         &Deadline::default(),
     )
-    .map(|imported| imported.mesh)
+    .map(|(mesh, _)| mesh)
 }
 
 /// Reads dotted keys that must be good. The view is `iso` where they name none.

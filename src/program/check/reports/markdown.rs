@@ -170,6 +170,7 @@ fn escaped(text: &str) -> String {
 mod tests {
     use super::*;
     use meshsnap_inspect::check::unopened;
+    use percent_encoding::percent_decode_str;
 
     #[test]
     fn names_and_sentences_are_no_markup() {
@@ -189,6 +190,20 @@ mod tests {
         }
         assert_eq!(name("a|b"), "<code>a&#124;b</code>");
         assert!(prose(&"é".repeat(1000)).ends_with("é…"));
+    }
+
+    #[test]
+    fn a_path_of_a_picture_keeps_slashes_and_unreserved_characters() {
+        for byte in 0..=0x7f_u8 {
+            let text = char::from(byte).to_string();
+            let escaped = utf8_percent_encode(&text, PATH).to_string();
+            let is_kept = byte.is_ascii_alphanumeric() || b"-._~/".contains(&byte);
+            assert_eq!(escaped, if is_kept { text } else { format!("%{byte:02X}") });
+        }
+        let text = "pictures/a b\"<é>.png";
+        let escaped = utf8_percent_encode(text, PATH).to_string();
+        assert_eq!(escaped, "pictures/a%20b%22%3C%C3%A9%3E.png");
+        assert_eq!(percent_decode_str(&escaped).decode_utf8().unwrap(), text);
     }
 
     #[test]

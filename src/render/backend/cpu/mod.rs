@@ -1,10 +1,10 @@
 //! The CPU rasterizer: the reference for bytes.
 //!
 //! Stages in order: transform and visibility in `geometry`, then `occlusion`, `peeling`, shade in
-//! `surface`, `mixed`, `lines`, `resolve`. Transform and occlusion look at the whole picture. `bands`
-//! runs the others: the picture is cut into bands of rows that fit a core's cache, threads take
-//! bands, and no band depends on another. The hot loops are compiled once per instruction set
-//! (`isa`).
+//! `surface`, `mixed`, `lines`, `resolve`. `context` holds the input of each. Transform and occlusion
+//! look at the whole picture. `bands` runs the others: the picture is cut into bands of rows that fit
+//! a core's cache, threads take bands, and no band depends on another. The hot loops are compiled
+//! once per instruction set (`isa`).
 //!
 //! **Invariant:** threads and instruction sets do not change a byte.
 
@@ -12,6 +12,7 @@
 #![allow(clippy::needless_range_loop)]
 
 mod bands;
+mod context;
 mod deadline_poll;
 pub(super) mod geometry;
 mod isa;
@@ -19,7 +20,7 @@ pub(super) mod lines;
 pub(super) mod mixed;
 pub(super) mod occlusion;
 pub(crate) mod peeling;
-mod resolve;
+pub(super) mod resolve;
 mod row_queue;
 mod stopwatch;
 pub(super) mod surface;
@@ -28,29 +29,25 @@ mod vector;
 
 pub use isa::Isa;
 pub use threads::DrawingThreads;
-use threads::ThreadShare;
 
-use std::ops::Range;
 use std::sync::Arc;
 
-use rayon::prelude::*;
+use half::f16;
 
 use self::bands::bins::Bins;
 use self::bands::scratch::{BandScratch, Banding, KEPT_BYTES_MAX, KeptSamples, ScratchPool};
-use self::isa::LANES;
+use self::context::RasterContext;
 use self::occlusion::Occlusion;
 use self::resolve::SrgbEncoder;
 use self::row_queue::RowQueue;
 use self::stopwatch::Stopwatch;
-use self::surface::flat::FlatColors;
+use self::surface::flat_colors::FlatColors;
+use self::threads::{CHUNK, ThreadShare, map};
 use super::{BackendKind, DrawError, DrawStage, DrawTimes, Renderer};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
-use crate::image::{Image, RowSink};
+use crate::image::{Image, LinearImage, RowSink};
 use crate::limits::Deadline;
 use crate::plan::{DrawPlan, OcclusionPass};
-
-/// Vertices or triangles handed to a thread at a time.
-const CHUNK: usize = 8192;
 
 /// Result of a run over all bands.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -77,25 +74,6 @@ pub struct CpuRenderer {
     is_plain: bool,
 }
 
-/// Input of every stage: the plan and the vertices on screen.
-pub struct RasterContext<'a> {
-    plan: &'a DrawPlan<'a>,
-    deadline: &'a Deadline,
-    /// The positions', then the hull's own.
-    vertices: &'a [ScreenVertex],
-    isa: Isa,
-    watch: &'a Stopwatch,
-    srgb: &'a SrgbEncoder,
-    /// The colour of each triangle, where every material is flat.
-    flat: Option<&'a FlatColors>,
-    /// The light that pixels go without, where they do.
-    occlusion: Option<(&'a OcclusionPass, &'a Occlusion)>,
-    /// As [`DrawPlan::has_quarters`].
-    has_quarters: bool,
-    /// As [`CpuRenderer::plain`].
-    is_plain: bool,
-}
-
 impl CpuRenderer {
     /// A renderer that uses up to `threads` threads. Its pictures do not depend on how many.
     pub fn new(threads: usize) -> Self {
@@ -110,6 +88,7 @@ impl CpuRenderer {
     /// A renderer without shortcuts, for tests that compare bytes: triangles are set up one by one
     /// and drawn in blocks, nothing is left out behind tiles, each point is shaded by itself, and
     /// each edge is compared with every visible triangle.
+    #[cfg(feature = "plain")]
     pub fn plain(threads: usize) -> Self {
         Self { is_plain: true, ..Self::new(threads) }
     }
@@ -139,8 +118,8 @@ impl CpuRenderer {
         self.vertices.reserve_exact(plan.positions.len() + own.len());
         self.vertices.resize(plan.positions.len(), ScreenVertex::default());
         let chunks = plan.positions.chunks(CHUNK).zip(self.vertices.chunks_mut(CHUNK)).collect();
-        run(pool, chunks, |(positions, out)| geometry::transform::transform(isa, &plan.projection, positions, out));
-        self.vertices.extend(own.iter().map(ScreenVertex::from));
+        map(pool, chunks, |(positions, out)| geometry::transform::transform(isa, &plan.projection, positions, out));
+        self.vertices.extend_from_slice(own);
     }
 
     fn context<'a>(
@@ -189,7 +168,7 @@ impl CpuRenderer {
         banding.at_once = banding.at_once.min(share.count);
         let drawn = bands::bins::bin(&context, pool, [banding.rows, banding.margin]).map(|bins| {
             lap.end(DrawStage::Sort);
-            if FlatColors::suffice(plan) && !context.is_plain {
+            if FlatColors::suffice(plan) && !context.is_plain() {
                 flat.find(&context, pool, &bins.triangles);
                 context.flat = Some(&flat);
                 lap.end(DrawStage::FaceColors);
@@ -260,7 +239,7 @@ impl CpuRenderer {
                 });
             }
         });
-        occlusion.find(context, pass, share.pool());
+        occlusion.find(context.isa, plan.samples, pass, context.deadline, share.pool());
     }
 
     /// Frees buffers that are too large to keep for another picture.
@@ -299,58 +278,6 @@ impl CpuRenderer {
     }
 }
 
-impl RasterContext<'_> {
-    /// Vertex indices of a triangle.
-    #[inline(always)]
-    fn triangle(&self, id: u32) -> [u32; 3] {
-        let id = id as usize;
-        match (self.plan.triangles.get(id), &self.plan.hull) {
-            (Some(triangle), _) => *triangle,
-            (None, Some(hull)) => hull.triangles[id - self.plan.triangles.len()],
-            (None, None) => [0; 3],
-        }
-    }
-
-    /// Vertex indices of the triangles with these ids; None if they are not all of the mesh or all
-    /// of the outline mesh.
-    fn triangles_of(&self, ids: &Range<usize>) -> Option<&[[u32; 3]]> {
-        let own: &[[u32; 3]] = &self.plan.triangles;
-        let from_hull = || {
-            let first = ids.start.checked_sub(own.len())?;
-            self.plan.hull.as_ref()?.triangles.get(first..ids.end - own.len())
-        };
-        own.get(ids.clone()).or_else(from_hull)
-    }
-
-    /// Vertex indices of eight triangles.
-    #[inline(always)]
-    fn indices_of(&self, ids: &[u32; LANES]) -> [[u32; 3]; LANES] {
-        let triangles: &[[u32; 3]] = &self.plan.triangles;
-        let mut indices = [[0; 3]; LANES];
-        for l in 0..LANES {
-            indices[l] = match triangles.get(ids[l] as usize) {
-                Some(triangle) => *triangle,
-                None => self.triangle(ids[l]),
-            };
-        }
-        indices
-    }
-
-    /// True if a triangle belongs to the outline mesh.
-    #[inline(always)]
-    fn is_hull(&self, id: u32) -> bool {
-        id as usize >= self.plan.triangles.len()
-    }
-
-    /// The vertices of an id on screen.
-    #[inline(always)]
-    fn screen_triangle(&self, id: u32) -> [ScreenVertex; 3] {
-        // Not in a closure, which would be compiled for the baseline.
-        let [a, b, c] = self.triangle(id);
-        [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
-    }
-}
-
 impl Renderer for CpuRenderer {
     fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
         self.draw_picture(plan, None, deadline)
@@ -363,6 +290,12 @@ impl Renderer for CpuRenderer {
         deadline: &Deadline,
     ) -> Result<Image, DrawError> {
         self.draw_picture(plan, Some(sink), deadline)
+    }
+
+    fn draw_linear(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<LinearImage, DrawError> {
+        let mut rgba = vec![[f16::ZERO; 4]; plan.width_px as usize * plan.height_px as usize];
+        self.draw_bands(plan, deadline, (Goal::Picture, &mut rgba), bands::draw_linear)?;
+        Ok(LinearImage { width_px: plan.width_px, height_px: plan.height_px, rgba })
     }
 
     fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
@@ -379,13 +312,5 @@ impl Renderer for CpuRenderer {
 
     fn kind(&self) -> BackendKind {
         BackendKind::Cpu
-    }
-}
-
-/// Runs `each` over the items, on the pool if there is one.
-fn run<T: Send>(pool: Option<&rayon::ThreadPool>, items: Vec<T>, each: impl Fn(T) + Sync + Send) {
-    match pool {
-        Some(pool) => pool.install(|| items.into_par_iter().for_each(each)),
-        None => items.into_iter().for_each(each),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError, TryLockError};
 
-use super::RasterContext;
+use super::context::RasterContext;
 use crate::backend::DrawStage;
 use crate::image::RowSink;
 

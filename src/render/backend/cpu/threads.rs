@@ -10,6 +10,9 @@ use std::sync::{Mutex, PoisonError};
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+/// Vertices, triangles or edges that a thread takes at a time, where a list is divided.
+pub const CHUNK: usize = 8192;
+
 /// Threads for drawing.
 #[derive(Debug)]
 pub struct DrawingThreads {
@@ -91,6 +94,14 @@ impl<'a> ThreadShare<'a> {
 impl Drop for ThreadShare<'_> {
     fn drop(&mut self) {
         self.threads.drawing.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// Results of `each` for the items, in their order. They are found on the pool if there is one.
+pub fn map<T: Send, U: Send>(pool: Option<&ThreadPool>, items: Vec<T>, each: impl Fn(T) -> U + Sync + Send) -> Vec<U> {
+    match pool {
+        Some(pool) => pool.install(|| items.into_par_iter().map(each).collect()),
+        None => items.into_iter().map(each).collect(),
     }
 }
 

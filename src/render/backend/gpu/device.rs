@@ -2,7 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
-use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, TryLockError, mpsc};
 use std::thread;
 use std::time::Duration;
@@ -42,7 +42,6 @@ pub struct Gpu {
     pub(super) clock_step_ns: Option<f32>,
     info: GpuInfo,
     lost: Lost,
-    jobs_ended: AtomicU32,
     /// Held by the thread that polls.
     polling: Mutex<()>,
     /// Renderers that draw on it.
@@ -61,11 +60,6 @@ pub(super) struct Drawing<'a> {
     pub is_alone: bool,
 }
 
-/// Jobs after which a software device gets new pipelines. llvmpipe compiles a kernel anew for every
-/// set of uniform values that its branches depend on, and keeps each copy (1 to 3 MiB per job) until
-/// the pipeline goes. New pipelines cost seconds, so they are made seldom.
-const SOFTWARE_PIPELINE_JOBS: u32 = 128;
-
 /// Memory for what stays on a device, bytes; and on a software one, whose memory is the process's.
 const RESIDENT_BYTES: u64 = 1 << 30;
 const RESIDENT_BYTES_SOFTWARE: u64 = 64 << 20;
@@ -83,7 +77,7 @@ const ALONE_SIZE_OF_FEW: i32 = 1024;
 type Lost = Arc<OnceLock<String>>;
 
 /// Storage buffers that a kernel binds, at most.
-const STORAGE_BUFFERS: u32 = 17;
+const STORAGE_BUFFERS: u32 = 19;
 
 /// Polls without a pause: a small picture takes a fraction of a millisecond.
 const EAGER_POLLS: u32 = 64;
@@ -157,7 +151,6 @@ impl Gpu {
             clock_step_ns,
             info,
             lost,
-            jobs_ended: AtomicU32::new(0),
             polling: Mutex::new(()),
             renderers: AtomicUsize::new(0),
             jobs: AtomicUsize::new(0),
@@ -220,7 +213,6 @@ impl Gpu {
         if jobs > 1 {
             self.jobs_shared.fetch_add(jobs, Ordering::Relaxed);
         }
-        (0..jobs).for_each(|_| self.job_ended());
     }
 
     /// To be called for each new renderer.
@@ -249,14 +241,6 @@ impl Gpu {
     /// True for a software implementation on the CPU.
     pub fn is_software(&self) -> bool {
         self.info.device_type == type_name(wgpu::DeviceType::Cpu)
-    }
-
-    /// To be called after each job.
-    pub(super) fn job_ended(&self) {
-        let count = self.jobs_ended.fetch_add(1, Ordering::Relaxed).wrapping_add(1);
-        if self.is_software() && count.is_multiple_of(SOFTWARE_PIPELINE_JOBS) {
-            self.pipelines.clear();
-        }
     }
 
     /// Makes the pipelines of kernels that have none for this key: on all cores, or for a software device

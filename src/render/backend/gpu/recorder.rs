@@ -244,7 +244,7 @@ pub fn bind_buffers(
 ) -> Result<(Arc<Pipeline>, wgpu::BindGroup), DrawError> {
     let pipeline = gpu.pipelines.get(&gpu.handles.device, kernel, key);
     let mut bound = Vec::new();
-    for &(slot, _) in kernel.buffers() {
+    for &slot in &pipeline.slots {
         bound.push((slot, buffers.storage(&gpu.handles, kernel.bound_at(slot))?));
     }
     let entries: Vec<_> = bound

@@ -11,6 +11,7 @@ const MISSING_MAX: usize = 100;
 
 /// Who gave the files of a bundle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub enum Origin {
     /// An HTTP request.
     #[default]
@@ -91,6 +92,7 @@ struct Seen {
 
 /// A file that is named in another and is not in the bundle.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct Missing {
     /// The folder of the file that names it, in the bundle.
     pub folder: String,

@@ -1,5 +1,8 @@
-//! Reads an FBX file in another process: what goes there, what comes back, and the check of that. The other process
-//! has read a stranger's file in C, so that its answer is a stranger's too.
+//! Reads an FBX file in another process: the order that goes there, the answer that comes back, and the checks of it.
+//! The other process has read a stranger's file in C, so that its answer is a stranger's too.
+//!
+//! serde writes both as `postcard`. The format is private to two processes of one program: for it alone, and with the
+//! feature `isolate` alone, [`RawMesh`] and the types in it derive `Serialize`.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,10 +11,10 @@ use crate::import::bundle::{Bundle, BundleFile, FileUse, Missing, Origin};
 use crate::import::context::Context;
 use crate::import::isolate::{self, Isolation, Order};
 use crate::import::raw::RawMesh;
-use crate::import::{FileMetadata, Folder, Format, ImportReport, MeshError, MeshFault, text};
+use crate::import::{Folder, Format, MeshError, MeshFault, text};
 use crate::limits::{Budget, Deadline, LimitExceeded, Limits};
-use crate::mesh::material::{AlphaMode, ImageContent, ImageSource, TextureRef, Wrap};
-use crate::mesh::{LineOrPoint, MaterialSlot, UpAxis};
+use crate::mesh::MaterialSlot;
+use crate::mesh::material::{AlphaMode, ImageContent, TextureRef};
 use crate::warning::Warning;
 
 /// What the other process knows beside the file.
@@ -21,8 +24,7 @@ struct Head {
     limits: [u64; 3],
     /// Bytes that the job has spent before.
     spent_bytes: u64,
-    /// Who gave the files, as a number.
-    origin: u8,
+    origin: Origin,
     /// The paths of the bundle's files, and which of them is the mesh.
     paths: Vec<String>,
     entry: u32,
@@ -33,72 +35,17 @@ struct Head {
 #[derive(Serialize, Deserialize)]
 enum Answer {
     Mesh(Box<Read>),
-    Refused(Refusal),
+    /// The error, and the place in [`FLAGS`] of the flag that a limit names.
+    Refused(MeshError, u8),
 }
 
-#[derive(Serialize, Deserialize)]
-struct Refusal {
-    fault: u8,
-    detail: String,
-    /// What was counted, the count, the limit, and the number of its flag.
-    limit: Option<(String, u64, u64, u8)>,
-}
-
-/// A mesh, with the fields of [`RawMesh`] that the importer fills.
 #[derive(Serialize, Deserialize)]
 struct Read {
-    positions: Vec<[f64; 3]>,
-    normals: Vec<[f32; 3]>,
-    uvs: Vec<[f32; 2]>,
-    colors: Vec<[f32; 4]>,
-    triangles: Vec<[u32; 3]>,
-    edge_masks: Vec<u8>,
-    triangle_materials: Vec<u32>,
-    lines_and_points: Vec<([u32; 2], u32)>,
-    materials: Vec<Material>,
-    images: Vec<(String, Image)>,
-    up: u8,
-    file_vertices: u64,
-    loose_vertices: Option<u64>,
-    polygons_by_arity: [u64; 13],
-    /// Dropped faces and lines, in the order of [`ImportReport`].
-    dropped: [u64; 4],
-    /// Codes by their place in [`CODES`], with details.
-    warnings: Vec<(u8, String)>,
-    generator: Option<String>,
-    /// Nodes, meshes, animations, skins, cameras.
-    counts: [Option<u64>; 5],
+    raw: RawMesh,
+    /// The codes of the mesh's warnings, by their places in [`CODES`].
+    codes: Vec<u8>,
     spent_bytes: u64,
-    missing: Vec<(String, String)>,
-}
-
-#[derive(Serialize, Deserialize)]
-struct Material {
-    name: String,
-    base_color: Option<[f32; 4]>,
-    metallic: Option<f32>,
-    roughness: Option<f32>,
-    emissive: Option<[f32; 3]>,
-    /// Opaque, mask, blend; and the cutoff.
-    alpha: (u8, f32),
-    base_texture: Option<Texture>,
-    normal_texture: Option<Texture>,
-    emissive_texture: Option<Texture>,
-}
-
-#[derive(Serialize, Deserialize)]
-struct Texture {
-    image: u32,
-    transform: [[f32; 3]; 2],
-    wrap: [u8; 2],
-    nearest: bool,
-}
-
-#[derive(Serialize, Deserialize)]
-enum Image {
-    Embedded(Vec<u8>),
-    OfBundle(u32),
-    Absent,
+    missing: Vec<Missing>,
 }
 
 /// Codes of warnings about FBX files.
@@ -113,19 +60,7 @@ const CODES: &[&str] = &[
     "levels_ignored",
     "short_faces_ignored",
 ];
-const FAULTS: &[MeshFault] = &[
-    MeshFault::Broken,
-    MeshFault::Unrecognised,
-    MeshFault::Empty,
-    MeshFault::OutsideBundle,
-    MeshFault::Unsupported,
-    MeshFault::DecoderFailed,
-    MeshFault::Stopped,
-];
 const FLAGS: &[&str] = &["--limit-memory-bytes", "--limit-triangles", "--limit-nodes"];
-const ORIGINS: &[Origin] = &[Origin::Request, Origin::Command, Origin::Library];
-const AXES: &[UpAxis] = &[UpAxis::X, UpAxis::NegX, UpAxis::Y, UpAxis::NegY, UpAxis::Z, UpAxis::NegZ];
-const WRAPS: &[Wrap] = &[Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
 /// The other process has the paths of the bundle's files and not their bytes: these stand for them, with the
 /// file's number behind. A texture in the FBX file that begins so means a file of its own bundle.
 const STAND_IN: &[u8] = b"\0meshsnap: file ";
@@ -134,12 +69,11 @@ const STAND_IN: &[u8] = b"\0meshsnap: file ";
 pub fn read(bytes: &[u8], isolation: &dyn Isolation, cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let (paths, entry) = cx.bundle.paths();
     let Limits { memory_bytes, triangles, nodes, .. } = *cx.limits;
-    let origin = place(ORIGINS, &cx.bundle.origin());
     let spent_bytes = cx.budget.spent_bytes();
     let head = Head {
         limits: [memory_bytes, triangles, nodes],
         spent_bytes,
-        origin,
+        origin: cx.bundle.origin(),
         paths,
         entry,
         counts_loose: cx.counts_loose,
@@ -153,38 +87,43 @@ pub fn read(bytes: &[u8], isolation: &dyn Isolation, cx: &mut Context<'_>) -> Re
     cx.budget.spend("the FBX file", answer.len() as u64, 1)?;
     let foul = || MeshError::new(MeshFault::DecoderCrashed, "the decoder of this format answered with nonsense");
     match postcard::from_bytes(&answer).map_err(|_| foul())? {
-        Answer::Refused(refusal) => Err(refusal.error().ok_or_else(foul)?),
-        Answer::Mesh(mesh) => mesh.check(cx)?.ok_or_else(foul),
+        Answer::Refused(error, flag) => Err(checked_error(error, flag).ok_or_else(foul)?),
+        Answer::Mesh(read) => read.check(cx)?.ok_or_else(foul),
     }
 }
 
 /// What the other process does with an order.
 pub fn answer(head: &[u8], bytes: &[u8]) -> Vec<u8> {
     let read = match postcard::from_bytes::<Head>(head) {
-        Ok(head) => read_there(&head, bytes),
+        Ok(head) => read_there(head, bytes),
         Err(_) => Err(MeshError::broken("the order cannot be read")),
     };
     let answer = match read {
         Ok(read) => Answer::Mesh(Box::new(read)),
-        Err(error) => Answer::Refused(Refusal::of(&error)),
+        Err(error) => {
+            let flag = match &error.fault {
+                MeshFault::Limit(limit) => place(FLAGS, limit.flag),
+                _ => 0,
+            };
+            Answer::Refused(error, flag)
+        }
     };
     postcard::to_stdvec(&answer).unwrap_or_default()
 }
 
-fn read_there(head: &Head, bytes: &[u8]) -> Result<Read, MeshError> {
+fn read_there(head: Head, bytes: &[u8]) -> Result<Read, MeshError> {
     let [memory_bytes, triangles, nodes] = head.limits;
     let limits = Limits { memory_bytes, triangles, nodes, ..Limits::default() };
     let mut budget = Budget::new(&limits);
     budget.spend("the files", head.spent_bytes, 1)?;
-    let stand_in = |(number, path): (usize, &String)| BundleFile {
-        path: path.clone(),
+    let stand_in = |(number, path): (usize, String)| BundleFile {
+        path,
         bytes: [STAND_IN, &(number as u32).to_le_bytes()].concat().into(),
     };
-    let files: Vec<BundleFile> = head.paths.iter().enumerate().map(stand_in).collect();
+    let files: Vec<BundleFile> = head.paths.into_iter().enumerate().map(stand_in).collect();
     let entry = (head.entry as usize).min(files.len().saturating_sub(1));
     let file_use = FileUse::default();
-    let origin = ORIGINS.get(usize::from(head.origin)).copied().unwrap_or_default();
-    let bundle = Bundle::default().given_by(origin).watched_by(&file_use);
+    let bundle = Bundle::default().given_by(head.origin).watched_by(&file_use);
     let folder = Folder::new(files, entry).of_bundle(&bundle);
     let deadline = Deadline::default();
     let mut cx = Context {
@@ -196,260 +135,116 @@ fn read_there(head: &Head, bytes: &[u8]) -> Result<Read, MeshError> {
         counts_loose: head.counts_loose,
     };
     let raw = scene::read(bytes, &mut cx)?;
-    let missing = file_use.missing().into_iter().map(|Missing { folder, name }| (folder, name)).collect();
-    Ok(Read { spent_bytes: budget.spent_bytes(), missing, ..Read::of(raw) })
+    let codes = raw.report.warnings.iter().map(|warning| place(CODES, warning.code)).collect();
+    Ok(Read { raw, codes, spent_bytes: budget.spent_bytes(), missing: file_use.missing() })
 }
 
-impl Refusal {
-    fn of(error: &MeshError) -> Self {
-        let limit = match &error.fault {
-            MeshFault::Limit(LimitExceeded { what, given, limit, flag }) => {
-                Some((what.clone(), *given, *limit, place(FLAGS, flag)))
-            }
-            _ => None,
-        };
-        Self { fault: place(FAULTS, &error.fault), detail: error.detail.clone(), limit }
-    }
+/// The place of a name in a list; past its end for one that is not there.
+fn place(names: &[&str], name: &str) -> u8 {
+    names.iter().position(|&one| one == name).unwrap_or(names.len()) as u8
+}
 
-    fn error(self) -> Option<MeshError> {
-        if let Some((what, given, limit, flag)) = self.limit {
+/// The error of the other process; None if the importer has no such error.
+fn checked_error(error: MeshError, flag: u8) -> Option<MeshError> {
+    match error.fault {
+        MeshFault::Limit(limit) => {
             let flag = FLAGS.get(usize::from(flag))?;
-            return Some(LimitExceeded { what: text::cut(&what, 200), given, limit, flag }.into());
+            Some(LimitExceeded { what: text::cut(printable(&limit.what), 200), flag, ..limit }.into())
         }
-        Some(MeshError::new(FAULTS.get(usize::from(self.fault))?.clone(), printable(&self.detail)))
+        MeshFault::BundleBroken | MeshFault::EntryUnclear | MeshFault::DecoderCrashed => None,
+        fault => Some(MeshError::new(fault, printable(&error.detail))),
     }
 }
 
 impl Read {
-    fn of(raw: RawMesh) -> Self {
-        let ImportReport { metadata, .. } = raw.report;
-        let image = |image: ImageSource| {
-            let content = match &image.content {
-                ImageContent::Absent => Image::Absent,
-                ImageContent::Encoded(bytes) => match bytes.strip_prefix(STAND_IN).map(<[u8; 4]>::try_from) {
-                    Some(Ok(number)) => Image::OfBundle(u32::from_le_bytes(number)),
-                    _ => Image::Embedded(bytes.to_vec()),
-                },
-            };
-            (image.name, content)
-        };
-        Self {
-            positions: raw.positions,
-            normals: raw.normals,
-            uvs: raw.uvs,
-            colors: raw.colors,
-            triangles: raw.triangles,
-            edge_masks: raw.edge_masks,
-            triangle_materials: raw.triangle_materials,
-            lines_and_points: raw.lines_and_points.iter().map(|one| (one.ends, one.material)).collect(),
-            materials: raw.materials.into_iter().map(Material::of).collect(),
-            images: raw.images.into_iter().map(image).collect(),
-            up: place(AXES, &raw.up),
-            file_vertices: raw.report.file_vertices,
-            loose_vertices: raw.report.loose_vertices,
-            polygons_by_arity: raw.report.polygons_by_arity,
-            dropped: [
-                raw.report.dropped_nonfinite_faces,
-                raw.report.dropped_degenerate_faces,
-                raw.report.dropped_collapsed_faces,
-                raw.report.dropped_lines_and_points,
-            ],
-            warnings: raw.report.warnings.into_iter().map(|w| (place(CODES, &w.code), w.detail)).collect(),
-            generator: metadata.generator,
-            counts: [metadata.nodes, metadata.meshes, metadata.animations, metadata.skins, metadata.cameras],
-            spent_bytes: 0,
-            missing: Vec::new(),
-        }
-    }
-
-    /// The mesh, paid for and checked like any other stranger's bytes; None if it is not what an importer makes.
+    /// The mesh, paid for and checked like any other stranger's bytes; None if it is not what the importer makes.
     fn check(self, cx: &mut Context<'_>) -> Result<Option<RawMesh>, MeshError> {
-        cx.check_triangles(self.triangles.len() as u64)?;
-        let spent = self.spent_bytes.saturating_sub(cx.budget.spent_bytes());
+        let Self { mut raw, codes, spent_bytes, missing } = self;
+        cx.check_triangles(raw.triangles.len() as u64)?;
+        let spent = spent_bytes.saturating_sub(cx.budget.spent_bytes());
         cx.budget.spend("the FBX file", spent, 1)?;
-        for (folder, name) in self.missing.iter().take(100) {
+        for Missing { folder, name } in missing.iter().take(100) {
             cx.bundle.note_missing(folder, name);
         }
-        let Some(images) = images_of(self.images, cx)? else { return Ok(None) };
-        let lists = Lists {
-            vertices: self.positions.len(),
-            triangles: self.triangles.len(),
-            materials: self.materials.len(),
-            images: images.len(),
-        };
-        let materials: Option<Vec<MaterialSlot>> = self.materials.into_iter().map(|m| m.slot(&lists)).collect();
-        let warning = |(code, detail): (u8, String)| {
-            Some(Warning { code: CODES.get(usize::from(code))?, detail: printable(&detail) })
-        };
-        let warnings: Option<Vec<Warning>> = self.warnings.into_iter().map(warning).collect();
-        let (Some(materials), Some(warnings), Some(&up)) = (materials, warnings, AXES.get(usize::from(self.up))) else {
-            return Ok(None);
-        };
-        let is_whole = lists.fit(&self.triangles, &self.lines_and_points)
-            && [self.normals.len(), self.uvs.len(), self.colors.len()].iter().all(|&n| n == 0 || n == lists.vertices)
-            && self.edge_masks.len() == lists.triangles
-            && self.edge_masks.iter().all(|&mask| mask < 8)
-            && self.triangle_materials.len() == lists.triangles
-            && self.triangle_materials.iter().all(|&material| lists.has_material(material));
-        if !is_whole {
-            return Ok(None);
+        let is_good = is_whole(&raw) && check_warnings(&mut raw.report.warnings, &codes) && put_images(&mut raw, cx)?;
+        for name in raw.materials.iter_mut().map(|slot| &mut slot.name).chain(&mut raw.report.metadata.generator) {
+            *name = printable(name);
         }
-        let [nodes, meshes, animations, skins, cameras] = self.counts;
-        let [dropped_nonfinite_faces, dropped_degenerate_faces, dropped_collapsed_faces, dropped_lines_and_points] =
-            self.dropped;
-        let generator = self.generator.map(|generator| printable(&generator));
-        let report = ImportReport {
-            format: Format::Fbx,
-            file_vertices: self.file_vertices,
-            loose_vertices: self.loose_vertices,
-            polygons_by_arity: self.polygons_by_arity,
-            dropped_nonfinite_faces,
-            dropped_degenerate_faces,
-            dropped_collapsed_faces,
-            dropped_lines_and_points,
-            warnings,
-            metadata: FileMetadata { generator, nodes, meshes, animations, skins, cameras, ..FileMetadata::default() },
-            ..ImportReport::default()
-        };
-        let lines_and_points = self.lines_and_points.into_iter();
-        Ok(Some(RawMesh {
-            positions: self.positions,
-            normals: self.normals,
-            uvs: self.uvs,
-            colors: self.colors,
-            triangles: self.triangles,
-            edge_masks: self.edge_masks,
-            triangle_materials: self.triangle_materials,
-            lines_and_points: lines_and_points.map(|(ends, material)| LineOrPoint { ends, material }).collect(),
-            materials,
-            images,
-            up,
-            report,
-            ..RawMesh::default()
-        }))
+        Ok(is_good.then_some(raw))
     }
 }
 
-/// The images, those of the bundle paid for; None if one is not there.
-fn images_of(images: Vec<(String, Image)>, cx: &mut Context<'_>) -> Result<Option<Vec<ImageSource>>, MeshError> {
-    let mut found = Vec::with_capacity(images.len());
-    for (name, image) in images {
-        let content = match image {
-            Image::Absent => ImageContent::Absent,
-            Image::Embedded(bytes) => ImageContent::Encoded(bytes.into()),
-            Image::OfBundle(number) => match cx.bundle.try_file(number as usize) {
-                Some(file) => {
-                    cx.budget.spend("a texture file", file.bytes.len() as u64, 1)?;
-                    ImageContent::Encoded(file.bytes.as_ref().into())
-                }
-                None => return Ok(None),
-            },
-        };
-        found.push(ImageSource { name: printable(&name), content });
-    }
-    Ok(Some(found))
+/// True if all lists go together and all indices and numbers are in range.
+fn is_whole(raw: &RawMesh) -> bool {
+    let (vertices, triangles) = (raw.positions.len(), raw.triangles.len());
+    let is_vertex = |&vertex: &u32| (vertex as usize) < vertices;
+    let has_material = |&material: &u32| (material as usize) < raw.materials.len().max(1);
+    let attributes = [raw.normals.len(), raw.uvs.len(), raw.second_uvs.len(), raw.colors.len()];
+    let metadata = &raw.report.metadata;
+    raw.report.format == Format::Fbx
+        && metadata.extensions_used.is_empty()
+        && metadata.extensions_required.is_empty()
+        && raw.triangles.iter().flatten().all(is_vertex)
+        && raw.lines_and_points.iter().all(|one| one.ends.iter().all(is_vertex) && has_material(&one.material))
+        && attributes.iter().all(|&count| count == 0 || count == vertices)
+        && raw.edge_masks.len() == triangles
+        && raw.edge_masks.iter().all(|&mask| mask < 8)
+        && raw.triangle_materials.len() == triangles
+        && raw.triangle_materials.iter().all(has_material)
+        && raw.materials.iter().all(|slot| is_slot(slot, raw.images.len()))
 }
 
-/// The lengths of lists that indices refer to.
-struct Lists {
-    vertices: usize,
-    triangles: usize,
-    materials: usize,
-    images: usize,
+/// True if the numbers of a material are in range and its images exist.
+fn is_slot(slot: &MaterialSlot, images: usize) -> bool {
+    let is_factor = |value: &f32| (0.0..=1.0).contains(value);
+    let is_texture = |texture: &TextureRef| {
+        (texture.image as usize) < images && texture.transform.as_flattened().iter().all(|n| n.is_finite())
+    };
+    let is_alpha = match &slot.alpha {
+        AlphaMode::Opaque | AlphaMode::Blend => true,
+        AlphaMode::Mask(cutoff) => is_factor(cutoff),
+    };
+    let mut factors = slot.base_color.iter().flatten().chain(&slot.metallic).chain(&slot.roughness);
+    let textures = [
+        &slot.base_texture,
+        &slot.metallic_roughness_texture,
+        &slot.normal_texture,
+        &slot.emissive_texture,
+        &slot.occlusion_texture,
+    ];
+    factors.all(is_factor)
+        && slot.occlusion_texture_strength.iter().all(is_factor)
+        && slot.emissive.iter().flatten().all(|value| (0.0..=1e4).contains(value))
+        && slot.normal_scale.is_none_or(f32::is_finite)
+        && is_alpha
+        && textures.into_iter().flatten().all(is_texture)
 }
 
-impl Lists {
-    fn has_material(&self, material: u32) -> bool {
-        (material as usize) < self.materials.max(1)
+/// Gives warnings their codes. False if one is not known.
+fn check_warnings(warnings: &mut [Warning], codes: &[u8]) -> bool {
+    for (warning, &code) in warnings.iter_mut().zip(codes) {
+        warning.code = CODES.get(usize::from(code)).copied().unwrap_or_default();
+        warning.detail = printable(&warning.detail);
     }
-
-    fn fit(&self, triangles: &[[u32; 3]], lines_and_points: &[([u32; 2], u32)]) -> bool {
-        let is_vertex = |&vertex: &u32| (vertex as usize) < self.vertices;
-        triangles.iter().flatten().all(is_vertex)
-            && lines_and_points
-                .iter()
-                .all(|(ends, material)| ends.iter().all(is_vertex) && self.has_material(*material))
-    }
+    codes.len() == warnings.len() && warnings.iter().all(|warning| !warning.code.is_empty())
 }
 
-impl Material {
-    fn of(slot: MaterialSlot) -> Self {
-        let alpha = match slot.alpha {
-            AlphaMode::Opaque => (0, 0.0),
-            AlphaMode::Mask(cutoff) => (1, cutoff),
-            AlphaMode::Blend => (2, 0.0),
-        };
-        let texture = |texture: TextureRef| Texture {
-            image: texture.image,
-            transform: texture.transform,
-            wrap: texture.wrap.map(|wrap| place(WRAPS, &wrap)),
-            nearest: texture.nearest,
-        };
-        Self {
-            name: slot.name,
-            base_color: slot.base_color,
-            metallic: slot.metallic,
-            roughness: slot.roughness,
-            emissive: slot.emissive,
-            alpha,
-            base_texture: slot.base_texture.map(texture),
-            normal_texture: slot.normal_texture.map(texture),
-            emissive_texture: slot.emissive_texture.map(texture),
-        }
+/// Puts the files of the bundle, which are paid for, where stand-ins are. False if one is not there.
+fn put_images(raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<bool, MeshError> {
+    for image in &mut raw.images {
+        image.name = printable(&image.name);
+        let ImageContent::Encoded(bytes) = &mut image.content else { continue };
+        let Some(Ok(number)) = bytes.strip_prefix(STAND_IN).map(<[u8; 4]>::try_from) else { continue };
+        let Some(file) = cx.bundle.try_file(u32::from_le_bytes(number) as usize) else { return Ok(false) };
+        cx.budget.spend("a texture file", file.bytes.len() as u64, 1)?;
+        *bytes = file.bytes.as_ref().into();
     }
-
-    /// The slot; None if a number is outside of what the importer makes, or an image does not exist.
-    fn slot(self, lists: &Lists) -> Option<MaterialSlot> {
-        let within = |values: &[f32], most: f32| values.iter().all(|value| (0.0..=most).contains(value));
-        let is_good = self.base_color.is_none_or(|color| within(&color, 1.0))
-            && self.metallic.is_none_or(|value| within(&[value], 1.0))
-            && self.roughness.is_none_or(|value| within(&[value], 1.0))
-            && self.emissive.is_none_or(|color| within(&color, 1e4));
-        let alpha = match self.alpha {
-            (0, _) => AlphaMode::Opaque,
-            (1, cutoff) if within(&[cutoff], 1.0) => AlphaMode::Mask(cutoff),
-            (2, _) => AlphaMode::Blend,
-            _ => return None,
-        };
-        let texture = |texture: Option<Texture>| match texture {
-            None => Some(None),
-            Some(texture) => texture.checked(lists).map(Some),
-        };
-        let slot = MaterialSlot {
-            name: printable(&self.name),
-            base_color: self.base_color,
-            metallic: self.metallic,
-            roughness: self.roughness,
-            emissive: self.emissive,
-            alpha,
-            base_texture: texture(self.base_texture)?,
-            normal_texture: texture(self.normal_texture)?,
-            emissive_texture: texture(self.emissive_texture)?,
-            ..MaterialSlot::default()
-        };
-        is_good.then_some(slot)
-    }
-}
-
-impl Texture {
-    fn checked(self, lists: &Lists) -> Option<TextureRef> {
-        let wrap = |number: u8| WRAPS.get(usize::from(number)).copied();
-        let is_good = (self.image as usize) < lists.images && self.transform.iter().flatten().all(|n| n.is_finite());
-        let wrap = [wrap(self.wrap[0])?, wrap(self.wrap[1])?];
-        let texture = TextureRef::new(self.image);
-        is_good.then_some(TextureRef { transform: self.transform, wrap, nearest: self.nearest, ..texture })
-    }
-}
-
-/// The place of a value in a list; past its end for one that is not there.
-fn place<T: PartialEq>(all: &[T], value: &T) -> u8 {
-    all.iter().position(|one| one == value).unwrap_or(all.len()) as u8
+    Ok(true)
 }
 
 /// Text of the other process without control characters, cut to a length that messages have.
 fn printable(text: &str) -> String {
-    let text: String = text.chars().map(|c| if c.is_control() { '\u{FFFD}' } else { c }).take(1024).collect();
-    text
+    text.chars().map(|c| if c.is_control() { '\u{FFFD}' } else { c }).take(1024).collect()
 }
 
 #[cfg(test)]
@@ -458,6 +253,8 @@ mod tests {
     use crate::import::isolate::IsolationError;
     use crate::import::normalise;
     use crate::import::test_random::Random;
+    use crate::mesh::LineOrPoint;
+    use crate::mesh::material::ImageSource;
 
     const FILES: [&[u8]; 2] = [
         include_bytes!("../../../../fuzz/seeds/fbx/cube.fbx"),
@@ -489,7 +286,7 @@ mod tests {
             counts_loose: false,
         };
         let raw = read(file, &Changed(Box::new(change)), &mut cx)?;
-        normalise(raw, &mut cx).map(|imported| imported.mesh.triangles.len())
+        normalise(raw, &mut cx).map(|(mesh, _)| mesh.triangles.len())
     }
 
     #[test]
@@ -518,5 +315,56 @@ mod tests {
         }
         // Coordinates may be any numbers; lengths and indices may not.
         assert!(refused > 100 && believed > 100, "{refused} refused, {believed} believed");
+    }
+
+    #[test]
+    fn a_mesh_that_no_importer_makes_is_refused() {
+        fn slot(read: &mut Read, slot: MaterialSlot) {
+            read.raw.materials.push(slot);
+        }
+        let spoils: &[fn(&mut Read)] = &[
+            |read| read.raw.positions.truncate(1),
+            |read| read.raw.normals.push([0.0; 3]),
+            |read| read.raw.uvs.push([0.0; 2]),
+            |read| read.raw.second_uvs.push([0.0; 2]),
+            |read| read.raw.colors.push([0.0; 4]),
+            |read| read.raw.triangles[0][2] = read.raw.positions.len() as u32,
+            |read| read.raw.edge_masks[0] = 8,
+            |read| read.raw.edge_masks.push(0),
+            |read| read.raw.triangle_materials[0] = 9,
+            |read| read.raw.triangle_materials.truncate(1),
+            |read| read.raw.lines_and_points.push(LineOrPoint::point(u32::MAX, 0)),
+            |read| read.raw.lines_and_points.push(LineOrPoint::point(0, 9)),
+            |read| read.raw.report.format = Format::Glb,
+            |read| read.raw.report.metadata.extensions_used.push("x".into()),
+            |read| read.raw.report.metadata.extensions_required.push("x".into()),
+            |read| read.raw.report.warnings.push(Warning { code: "", detail: "x".into() }),
+            |read| read.codes.push(0),
+            |read| {
+                read.raw.report.warnings.push(Warning { code: "", detail: "x".into() });
+                read.codes.push(200);
+            },
+            |read| {
+                let content = ImageContent::Encoded([STAND_IN, &[9, 0, 0, 0]].concat().into());
+                read.raw.images.push(ImageSource { name: "x".into(), content });
+            },
+            |read| slot(read, MaterialSlot { base_color: Some([0.0, 1.5, 0.0, 1.0]), ..MaterialSlot::default() }),
+            |read| slot(read, MaterialSlot { metallic: Some(-1.0), ..MaterialSlot::default() }),
+            |read| slot(read, MaterialSlot { roughness: Some(f32::NAN), ..MaterialSlot::default() }),
+            |read| slot(read, MaterialSlot { emissive: Some([1e5; 3]), ..MaterialSlot::default() }),
+            |read| slot(read, MaterialSlot { alpha: AlphaMode::Mask(2.0), ..MaterialSlot::default() }),
+            |read| slot(read, MaterialSlot { normal_scale: Some(f32::INFINITY), ..MaterialSlot::default() }),
+            |read| slot(read, MaterialSlot { occlusion_texture_strength: Some(2.0), ..MaterialSlot::default() }),
+            |read| slot(read, MaterialSlot { base_texture: Some(TextureRef::new(99)), ..MaterialSlot::default() }),
+            |read| slot(read, MaterialSlot { occlusion_texture: Some(TextureRef::new(99)), ..MaterialSlot::default() }),
+        ];
+        for (number, &spoil) in spoils.iter().enumerate() {
+            let refused = outcome(FILES[0], move |answer| {
+                let Ok(Answer::Mesh(mut read)) = postcard::from_bytes(&answer) else { panic!("{number}: no mesh") };
+                spoil(&mut read);
+                postcard::to_stdvec(&Answer::Mesh(read)).unwrap()
+            });
+            assert_eq!(refused.unwrap_err().fault, MeshFault::DecoderCrashed, "{number}");
+        }
     }
 }

@@ -182,7 +182,7 @@ fn pick_scaled<G: Geometry>(
     let done =
         map_with((0..).step_by(TRIANGLES_PER_PIECE).zip(places).collect(), Local::new, |local, (begin, (n, t))| {
             deadline.check()?;
-            Ok(pick_piece(geometry, begin, &scale, (n, t), local))
+            Ok(pick_piece(geometry, begin, &scale, n, t, local))
         });
     let mut faces = Faces {
         normals: Vec::new(),
@@ -229,7 +229,8 @@ fn pick_piece<G: Geometry>(
     geometry: &G,
     begin: usize,
     scale: impl Fn([f64; 3]) -> [f64; 3],
-    (normals, triangles): (&mut [[f32; 3]], &mut [[u32; 3]]),
+    normals: &mut [[f32; 3]],
+    triangles: &mut [[u32; 3]],
     local: &mut Local<G::Key>,
 ) -> Picked<G::Key> {
     let piece = begin..begin + normals.len();

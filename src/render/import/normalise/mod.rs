@@ -20,7 +20,7 @@ use self::geometry::{Geometry, Indexed};
 use self::number::{Numbered, is_collapsed, number};
 use self::pow2::{Pow2, exponent, is_usable, max_abs};
 use super::raw::RawMesh;
-use super::{ImportReport, Imported, MeshError, MeshFault};
+use super::{ImportReport, MeshError, MeshFault};
 use crate::import::context::Context;
 use crate::limits::Stopped;
 use crate::mesh::vector::sub;
@@ -29,7 +29,7 @@ use crate::parallel::{map, map_items};
 use crate::pluralise::pluralise;
 
 /// Brings an imported mesh into its normal form.
-pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, MeshError> {
+pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<(Mesh, ImportReport), MeshError> {
     let mut soup = raw.soup.take();
     let [triangle_count, vertex_count] = match &soup {
         Some(soup) => [soup.triangles(), 3 * soup.triangles()],
@@ -91,7 +91,7 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     }
     (mesh.images, mesh.cameras) = (raw.images, raw.cameras);
     mesh.up = raw.up;
-    Ok(Imported { mesh, report: raw.report, path: cx.bundle.entry().path.clone() })
+    Ok((mesh, raw.report))
 }
 
 /// Positions, triangles, normals, lines and bounds of the mesh, and the triangle of each face
@@ -125,7 +125,7 @@ fn shape<G: Geometry>(
         return Err(empty(&raw.report));
     }
     let unit_box = UnitBox::around(faces.bounds.union(around_lines).scaled(down));
-    let (mut mesh, kept) = weld(geometry, faces, (down, &unit_box), raw, cx)?;
+    let (mut mesh, kept) = weld(geometry, faces, down, &unit_box, raw, cx)?;
     if mesh.triangles.is_empty() && mesh.lines_and_points.is_empty() {
         return Err(empty(&raw.report));
     }
@@ -195,7 +195,8 @@ impl UnitBox {
 fn weld<G: Geometry>(
     geometry: &mut G,
     mut faces: Faces<G::Key>,
-    (down, unit_box): (Pow2, &UnitBox),
+    down: Pow2,
+    unit_box: &UnitBox,
     raw: &mut RawMesh,
     cx: &Context<'_>,
 ) -> Result<(Mesh, Option<Vec<u32>>), Stopped> {
@@ -203,7 +204,7 @@ fn weld<G: Geometry>(
     let ends = raw.lines_and_points.iter().map(|one| one.ends);
     let has_attributes = raw.has_attributes();
     let Numbered { positions, mut triangles, ends, collapsed } =
-        number(geometry, &mut faces, ends, position, (has_attributes, cx.deadline))?;
+        number(geometry, &mut faces, ends, position, has_attributes, cx.deadline)?;
     raw.report.dropped_collapsed_faces = collapsed;
     if collapsed > 0 {
         let left: Vec<usize> = (0..triangles.len()).filter(|&face| !is_collapsed(&triangles[face])).collect();

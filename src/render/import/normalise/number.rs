@@ -38,7 +38,8 @@ pub fn number<G: Geometry>(
     faces: &mut Faces<G::Key>,
     ends: impl Iterator<Item = [u32; 2]> + Clone,
     position: impl Fn([f64; 3]) -> [f32; 3] + Sync,
-    (keeps_triangles, deadline): (bool, &Deadline),
+    keeps_triangles: bool,
+    deadline: &Deadline,
 ) -> Result<Numbered, Stopped> {
     let bits = |p: [f64; 3]| {
         let [x, y, z] = position(p);

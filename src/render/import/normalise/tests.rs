@@ -1,13 +1,14 @@
-//! Triangles that lie in the file become what the same triangles with indices become, on any number
-//! of threads.
+//! Triangles without indices (as in STL) become the same mesh as the same triangles with indices, on any number of
+//! threads.
 
 use super::normalise;
 use crate::import::bundle::{Bundle, entry};
 use crate::import::context::Context;
 use crate::import::polygon::ALL_EDGES;
 use crate::import::raw::{RawMesh, Soup};
-use crate::import::{Format, Imported};
+use crate::import::{Format, ImportReport};
 use crate::limits::{Budget, Deadline, Limits};
+use crate::mesh::Mesh;
 use bytes::Bytes;
 
 /// Bytes of a record, of which 36 are corners.
@@ -53,7 +54,7 @@ fn raw(corners: &[[f32; 9]], is_soup: bool) -> RawMesh {
     raw
 }
 
-fn finish(raw: RawMesh) -> Imported {
+fn finish(raw: RawMesh) -> (Mesh, ImportReport) {
     let limits = Limits::default();
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
     let (folder, _) =
@@ -78,7 +79,7 @@ fn soups_and_indices_agree_on_any_number_of_threads() {
         for threads in [1, 4] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             for is_soup in [false, true] {
-                let Imported { mesh, report, .. } = pool.install(|| finish(raw(&corners, is_soup)));
+                let (mesh, report) = pool.install(|| finish(raw(&corners, is_soup)));
                 let all = format!("{mesh:?} {report:?}");
                 assert!(all == *first.get_or_insert(all.clone()), "{side} {odd}: {threads} threads, soup: {is_soup}");
                 let left = mesh.triangles.len() as u64;
@@ -100,7 +101,7 @@ fn what_no_face_uses_changes_nothing() {
         raw.positions.iter_mut().flatten().for_each(|c| *c *= 0.1);
         raw.colors.clear();
         raw.positions.extend(unused);
-        let Imported { mesh, report, .. } = finish(raw);
+        let (mesh, report) = finish(raw);
         format!("{mesh:?} {report:?}")
     };
     let plain = mesh(&[]);

@@ -1,5 +1,6 @@
 //! A texture statement of an MTL file: options, then a file name that may have spaces.
 
+use crate::import::text;
 use crate::mesh::material::{TextureRef, Wrap};
 
 /// Longest file name that is kept, in bytes. No file of a bundle has a longer path.
@@ -74,7 +75,7 @@ impl Map {
 
 /// A finite number of reasonable size.
 pub fn number(word: &[u8]) -> Option<f64> {
-    let number: f64 = std::str::from_utf8(word).ok()?.parse().ok()?;
+    let number = text::number(word)?;
     // Beyond this, nothing that is computed from it in f32 would be finite.
     (number.abs() < 1e9).then_some(number)
 }

@@ -122,6 +122,6 @@ impl Source for Text<'_> {
 
 /// A number as C prints it, NaN of any kind included.
 fn parse(word: &[u8]) -> Option<Number> {
-    let value = if text::is_c_nan(word) { f64::NAN } else { std::str::from_utf8(word).ok()?.parse().ok()? };
+    let value = if text::is_c_nan(word) { f64::NAN } else { text::number(word)? };
     Some(Number { value, is_whole: word.iter().all(u8::is_ascii_digit) })
 }

@@ -102,5 +102,5 @@ fn parse(word: &[u8]) -> Option<f64> {
     if text::is_c_nan(word) {
         return Some(f64::NAN);
     }
-    std::str::from_utf8(word).ok()?.parse().ok()
+    text::number(word)
 }

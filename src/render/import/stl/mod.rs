@@ -132,18 +132,19 @@ fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError>
     let body = cx.bundle.entry().bytes.slice(HEADER_BYTES..declared as usize);
     raw.soup = Some(Soup::new(body.clone(), TRIANGLE_BYTES, 12));
     cx.deadline.check()?;
-    paint(&mut raw, &bytes[..80], (&body, count), cx)?;
+    paint(&mut raw, &bytes[..80], &body, cx)?;
     finish(raw, count as usize)
 }
 
 /// Gives each triangle's three vertices the colour in its attribute bytes.
-fn paint(raw: &mut RawMesh, header: &[u8], (body, count): (&[u8], u64), cx: &mut Context<'_>) -> Result<(), MeshError> {
+fn paint(raw: &mut RawMesh, header: &[u8], body: &[u8], cx: &mut Context<'_>) -> Result<(), MeshError> {
     let any_is_flagged = || {
         let pieces = body.chunks(TRIANGLES_PER_PIECE * TRIANGLE_BYTES).collect();
         map(pieces, |piece: &[u8]| attributes(piece).any(is_flagged)).contains(&true)
     };
     let Some(colors) = Colors::of(header, any_is_flagged) else { return Ok(()) };
     cx.deadline.check()?;
+    let count = (body.len() / TRIANGLE_BYTES) as u64;
     cx.budget.spend("the colours of STL triangles", 3 * count, 16)?;
     raw.colors.reserve_exact(3 * count as usize);
     raw.colors.extend(attributes(body).flat_map(|attribute| [colors.color(attribute); 3]));
@@ -220,7 +221,7 @@ fn name(text: &[u8], newline: u8) -> &[u8] {
 }
 
 fn parse(word: Option<&[u8]>) -> Option<f64> {
-    std::str::from_utf8(word?).ok()?.parse().ok()
+    text::number(word?)
 }
 
 fn bad_line(index: usize, what: &str) -> MeshError {

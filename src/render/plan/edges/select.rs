@@ -20,13 +20,14 @@ pub fn select<T: Zeroable + Send>(
     cx: &mut PlanContext<'_>,
     each: impl Fn(Range<usize>, &mut dyn FnMut(T)) + Sync,
 ) -> Result<Vec<T>, PlanError> {
-    select_by(what, [count, CHUNK], cx, each)
+    select_by(what, count, CHUNK, cx, each)
 }
 
 /// As [`select`] in a list of so many items, of which a thread takes so many at a time.
 pub fn select_by<T: Zeroable + Send>(
     what: &str,
-    [count, chunk]: [usize; 2],
+    count: usize,
+    chunk: usize,
     cx: &mut PlanContext<'_>,
     each: impl Fn(Range<usize>, &mut dyn FnMut(T)) + Sync,
 ) -> Result<Vec<T>, PlanError> {

@@ -3,14 +3,16 @@
 use super::face_runs::FaceRun;
 use crate::mesh::Mesh;
 use crate::mesh::vector::dot;
-use crate::plan::Projection;
-use crate::plan::projection::row_dot;
+use crate::plan::Projector;
 
 /// The largest relative error of a determinant of three rounded places, generously.
 const ROUNDED: f64 = 1e-13;
 
 /// Errors of a cone and of the direction to the eye, relative, generously.
 const TURNED: f64 = 1e-5;
+
+/// The error of the least W in a box, relative, generously.
+const NEAR_ROUNDED: f64 = 1e-6;
 
 /// A distance on screen beyond all rounding errors, 1/256 px.
 const BESIDE: f64 = 1.0;
@@ -21,8 +23,8 @@ const BESIDE: f64 = 1.0;
 /// formula of Cauchy and Binet it is the product of the face's plane with the eye, a homogeneous point.
 #[derive(Clone, Copy, Debug)]
 pub struct RunView {
-    rows: [[f32; 4]; 3],
-    near: f64,
+    projector: Projector,
+    near_w: f64,
     /// The eye, or the direction to it where `eye_w` is 0, times a factor that may be negative.
     eye: [f64; 3],
     eye_w: f64,
@@ -33,10 +35,9 @@ pub struct RunView {
 }
 
 impl RunView {
-    /// The view of a mesh by a projection, whose smallest W is `near`.
-    pub fn new(mesh: &Mesh, projection: &Projection, near: f64) -> Self {
-        let rows = [projection.x, projection.y, projection.w];
-        let [x, y, w] = rows.map(|row| row.map(f64::from));
+    /// The view of a mesh by a projection. What has a W of less than `near_w` is not on screen.
+    pub fn new(mesh: &Mesh, projector: Projector, near_w: f64) -> Self {
+        let [x, y, _, w] = projector.rows;
         let minor = |[i, j, k]: [usize; 3]| {
             x[i] * (y[j] * w[k] - y[k] * w[j]) - x[j] * (y[i] * w[k] - y[k] * w[i]) + x[k] * (y[i] * w[j] - y[j] * w[i])
         };
@@ -52,8 +53,8 @@ impl RunView {
             row[3].abs() + (0..3).map(|k| row[k].abs() * reach[k]).sum::<f64>()
         };
         Self {
-            rows,
-            near,
+            projector,
+            near_w,
             eye: [ex, -ey, ez],
             eye_w: -ew,
             rounded: ROUNDED * 6.0 * [&x, &y, &w].map(absolute).iter().product::<f64>(),
@@ -91,20 +92,19 @@ impl RunView {
         let middle = std::array::from_fn(|k| 0.5 * (low[k] + high[k]));
         // Half a side, and what rounding the middle leaves out.
         let half: [f64; 3] = std::array::from_fn(|k| f64::from(high[k] - low[k]) * 0.5 + 1e-6);
-        let [x, y, w] = self.rows.map(|row| row_dot(&row, middle));
+        let [x, y, w] = self.projector.place(middle);
         let reach = |row: [f64; 3]| (0..3).map(|k| row[k].abs() * half[k]).sum::<f64>();
-        let row = |i: usize| [0, 1, 2].map(|k| f64::from(self.rows[i][k]));
-        let least_w = w - reach(row(2));
-        if least_w < self.near * (1.0 + 1e-6) || least_w.is_nan() {
+        let [right, down, _, away] = self.projector.rows.map(|[x, y, z, _]| [x, y, z]);
+        let least_w = w - reach(away);
+        if least_w < self.near_w * (1.0 + NEAR_ROUNDED) || least_w.is_nan() {
             return None;
         }
         // X / W - s = (X - s W) / W, where s is the middle's: the numerator is 0 there.
-        let range = |i: usize, middle: f64| {
-            let (across, depth) = (row(i), row(2));
-            let far = reach([0, 1, 2].map(|k| across[k] - middle * depth[k])) / least_w + BESIDE;
+        let range = |across: [f64; 3], middle: f64| {
+            let far = reach([0, 1, 2].map(|k| across[k] - middle * away[k])) / least_w + BESIDE;
             [middle - far, middle + far]
         };
-        let ([left, right], [top, bottom]) = (range(0, x / w), range(1, y / w));
+        let ([left, right], [top, bottom]) = (range(right, x / w), range(down, y / w));
         Some([[left, top], [right, bottom]])
     }
 }

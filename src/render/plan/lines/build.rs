@@ -10,7 +10,7 @@ use crate::plan::edges::select::select;
 use crate::plan::edges::silhouettes::{Silhouettes, hides_inside, unseen_side};
 use crate::plan::outline::parts::contours;
 use crate::plan::skips::SkipKind;
-use crate::plan::{Edge, LinePass, PlanError, Projection};
+use crate::plan::{Edge, LinePass, PlanError, Projection, Projector};
 use crate::scene::Scene;
 use crate::spec::Hidden;
 
@@ -93,9 +93,9 @@ impl Source<'_> {
             None => select("drawn edges", self.list.len(), cx, |range, found| self.each(style, range, found))?,
         };
         if style.min_length_px > 0.0 {
-            let projection = Projection::new(&self.scene.camera, self.scene.size_px(), true);
+            let projector = Projector::new(&Projection::new(&self.scene.camera, self.scene.size_px()));
             let min_px = f64::from(style.min_length_px);
-            cx.short_chains += remove_short(&mut found, self.scene.mesh, &projection, min_px, cx)?;
+            cx.short_chains += remove_short(&mut found, self.scene.mesh, &projector, min_px, cx)?;
         }
         Ok(Arc::new(found))
     }

@@ -25,6 +25,7 @@ pub struct LinePass {
     pub is_complete: bool,
     /// True if a short visible part beside a hidden one is drawn even where a thin face that no sample sees may hide
     /// it. True where all edges of an opaque mesh are drawn: the thin face's own lines cover the place.
+    /// So plans have it where a pass is complete. Tests set it alone, to compare strokes with holes.
     pub keeps_short_parts: bool,
     /// Full width, pixels.
     pub width_px: f32,

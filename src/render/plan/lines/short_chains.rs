@@ -7,18 +7,14 @@ use crate::limits::LimitExceeded;
 use crate::mesh::Mesh;
 use crate::mesh::union_find::UnionFind;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
-use crate::plan::projection::row_dot;
-use crate::plan::{Edge, PlanError, Projection};
-
-/// Pixels in a unit of a projection.
-const PX: f64 = 1.0 / 256.0;
+use crate::plan::{Edge, PX, PlanError, Projector};
 
 /// Leaves out the edges of chains that are shorter on screen than `min_px`, their hidden parts included. Those
 /// that reach behind the eye stay. Returns the number of chains that are gone.
 pub fn remove_short(
     edges: &mut Vec<Edge>,
     mesh: &Mesh,
-    projection: &Projection,
+    projector: &Projector,
     min_px: f64,
     cx: &mut PlanContext<'_>,
 ) -> Result<u32, PlanError> {
@@ -37,7 +33,7 @@ pub fn remove_short(
             cx.deadline.check()?;
         }
         let root = chains.sets.find(edge.vertices[0]);
-        chains.lengths_px[root as usize] += length_px(mesh, projection, edge);
+        chains.lengths_px[root as usize] += length_px(mesh, projector, edge);
     }
     let mut removed = 0;
     edges.retain(|edge| {
@@ -69,14 +65,10 @@ impl Chains {
 }
 
 /// The length of an edge on screen; without end if it reaches behind the eye.
-fn length_px(mesh: &Mesh, projection: &Projection, edge: &Edge) -> f64 {
-    let place = |v: u32| {
-        let p = mesh.positions[v as usize];
-        let [x, y, w] = [&projection.x, &projection.y, &projection.w].map(|row| row_dot(row, p));
-        (w >= f64::from(projection.near_w)).then(|| [PX * x / w, PX * y / w])
-    };
-    match edge.vertices.map(place) {
-        [Some(a), Some(b)] => libm::hypot(b[0] - a[0], b[1] - a[1]),
+fn length_px(mesh: &Mesh, projector: &Projector, edge: &Edge) -> f64 {
+    let near_w = projector.near_w(0.0);
+    match edge.vertices.map(|v| projector.on_screen(mesh.positions[v as usize], near_w)) {
+        [Some(a), Some(b)] => libm::hypot((b[0] - a[0]) / PX, (b[1] - a[1]) / PX),
         _ => f64::INFINITY,
     }
 }
@@ -85,6 +77,11 @@ fn length_px(mesh: &Mesh, projection: &Projection, edge: &Edge) -> f64 {
 mod tests {
     use super::*;
     use crate::limits::{Budget, Deadline, Limits};
+    use crate::plan::Projection;
+
+    fn projector() -> Projector {
+        Projector::new(&Projection::for_tests())
+    }
 
     /// Chains of 1, 2, ... edges beside each other, each edge 0.1 of a unit long: at the distance 1.4, 60 px a
     /// unit make 4.29 px of it.
@@ -102,7 +99,7 @@ mod tests {
         let (mesh, mut edges) = combs(6);
         let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
         let mut cx = PlanContext::new(&mut budget, &deadline, &[]);
-        let removed = remove_short(&mut edges, &mesh, &Projection::for_tests(), min_px, &mut cx).unwrap();
+        let removed = remove_short(&mut edges, &mesh, &projector(), min_px, &mut cx).unwrap();
         (removed, edges.len())
     }
 
@@ -121,7 +118,7 @@ mod tests {
         mesh.positions[1][2] = 3.0;
         let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
         let mut cx = PlanContext::new(&mut budget, &deadline, &[]);
-        assert_eq!(remove_short(&mut edges, &mesh, &Projection::for_tests(), 1e6, &mut cx).unwrap(), 0);
+        assert_eq!(remove_short(&mut edges, &mesh, &projector(), 1e6, &mut cx).unwrap(), 0);
         assert_eq!(edges.len(), 1);
     }
 }

@@ -11,7 +11,7 @@ fn the_camera_tells_nothing_that_positions_do_not() {
     let points = (0..300).map(|i| format!("v {} {} {}\n", i * 7 % 31, i * 11 % 23, i * 5 % 17)).collect::<String>();
     let faces = (0..100).map(|i| format!("f {} {} {}\n", 3 * i + 1, 3 * i + 2, 3 * i + 3)).collect::<String>();
     let bundle = Bundle::of_one((points + &faces).into_bytes());
-    let mesh = import(&bundle, None, &limits, &mut budget, &Deadline::default()).unwrap().mesh;
+    let mesh = import(&bundle, None, &limits, &mut budget, &Deadline::default()).unwrap().0;
     let mut counts = [0; 2];
     for (margin, height, projection) in [
         ("0.05", "null", "perspective"),

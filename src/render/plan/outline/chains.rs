@@ -4,13 +4,13 @@
 //! Scans and coarse meshes have a multitude of tiny folds. Each has a silhouette of a few pixels,
 //! beside which an outline would be a crumb.
 
-use crate::limits::Deadline;
+use crate::limits::{Deadline, Stopped};
 use crate::mesh::union_find::UnionFind;
-use crate::plan::PlanError;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
-use crate::plan::outline::screen_edges::{OutlineView, PX, ScreenEdge};
+use crate::plan::outline::screen_edges::{OutlineView, ScreenEdge};
 use crate::plan::outline::silhouette_edges::SilhouetteEdge;
 use crate::plan::outline::visible_parts::VisiblePart;
+use crate::plan::{PX, PlanError};
 
 /// The least length of a chain, in multiples of its outline's width.
 const LENGTH_MIN: f64 = 4.0;
@@ -60,12 +60,12 @@ pub fn remove_short(
     if parts.is_empty() || length.min_px.iter().all(|px| *px == Some(0.0)) {
         return Ok(0);
     }
-    let mut chains = Chains::new(view, edges, places, parts, cx)?;
-    chains.bridge(view, length.width, cx.deadline)?;
-    chains.join(cx.deadline)?;
-    let sums = chains.sums(view, length);
+    let mut chains = Chains::new(view, edges, places, parts, length, cx)?;
+    chains.bridge()?;
+    chains.join()?;
+    let sums = chains.sums();
     let roots: Vec<u32> = (0..parts.len()).map(|i| chains.sets.find(i as u32)).collect();
-    let is_dotted = chains.dotted(view, length.width, cx.deadline)?;
+    let is_dotted = chains.dotted()?;
     let mut dropped = 0;
     let mut keeps = Vec::with_capacity(parts.len());
     for (i, root) in roots.into_iter().enumerate() {
@@ -80,6 +80,9 @@ pub fn remove_short(
 
 /// Parts, and edges that are hidden wholly, joined at their vertices.
 struct Chains<'a> {
+    view: &'a OutlineView<'a>,
+    length: &'a ChainLength,
+    deadline: &'a Deadline,
     edges: &'a [SilhouetteEdge],
     places: &'a [ScreenEdge],
     parts: &'a [VisiblePart],
@@ -94,12 +97,13 @@ struct Chains<'a> {
 }
 
 impl<'a> Chains<'a> {
-    fn new(
-        view: &OutlineView<'_>,
+    fn new<'c: 'a>(
+        view: &'a OutlineView<'a>,
         edges: &'a [SilhouetteEdge],
         places: &'a [ScreenEdge],
         parts: &'a [VisiblePart],
-        cx: &mut PlanContext<'_>,
+        length: &'a ChainLength,
+        cx: &mut PlanContext<'c>,
     ) -> Result<Self, PlanError> {
         let vertices = view.view.mesh.positions.len();
         // A hidden edge's number, set, sum and mark; a part's set, root, sum and mark,
@@ -118,15 +122,21 @@ impl<'a> Chains<'a> {
         }
         let sets = UnionFind::new(parts.len() + hidden.len());
         let is_bridge = vec![false; hidden.len()];
-        Ok(Self { edges, places, parts, hidden, sets, last: vec![0; vertices], is_bridge })
+        let (last, deadline) = (vec![0; vertices], cx.deadline);
+        Ok(Self { view, length, deadline, edges, places, parts, hidden, sets, last, is_bridge })
+    }
+
+    /// The width of an edge's outline at its first end, 1/256 px.
+    fn width(&self, edge: usize) -> f64 {
+        self.length.width * self.view.reach(self.edges[edge].material, self.places[edge].ends[0][3])
     }
 
     /// Finds the hidden edges that hold chains together: connected ones that are short in all.
-    fn bridge(&mut self, view: &OutlineView<'_>, width: f64, deadline: &Deadline) -> Result<(), PlanError> {
+    fn bridge(&mut self) -> Result<(), Stopped> {
         let first = self.parts.len();
         for i in 0..self.hidden.len() {
             if i % CHECK_EVERY == 0 {
-                deadline.check()?;
+                self.deadline.check()?;
             }
             for end in 0..2 {
                 self.touch(self.hidden[i], end, first + i);
@@ -135,9 +145,9 @@ impl<'a> Chains<'a> {
         let mut lengths = vec![0_u64; self.hidden.len()];
         for i in 0..self.hidden.len() {
             let edge = self.hidden[i] as usize;
-            let limit = BRIDGED * width * view.reach(self.edges[edge].material, self.places[edge].ends[0][3]);
+            let limit = BRIDGED * self.width(edge);
             let root = self.sets.find((first + i) as u32) as usize - first;
-            lengths[root] += share(self.places[edge].way().1, limit);
+            lengths[root] += share(self.places[edge].way().length, limit);
         }
         for i in 0..self.hidden.len() {
             let root = self.sets.find((first + i) as u32) as usize - first;
@@ -148,10 +158,10 @@ impl<'a> Chains<'a> {
     }
 
     /// Joins all parts.
-    fn join(&mut self, deadline: &Deadline) -> Result<(), PlanError> {
+    fn join(&mut self) -> Result<(), Stopped> {
         for (i, part) in self.parts.iter().enumerate() {
             if i % CHECK_EVERY == 0 {
-                deadline.check()?;
+                self.deadline.check()?;
             }
             for end in (0..2).filter(|&end| part.range[end] == [0.0, 1.0][end]) {
                 self.touch(part.edge, end, i);
@@ -179,7 +189,7 @@ impl<'a> Chains<'a> {
     /// By part, true if it belongs to a long run of parts whose outline is hidden by what lies closely
     /// behind it: what is left of it would be a dotted line. Hidden edges belong to such runs, too. Chains are
     /// forgotten.
-    fn dotted(&mut self, view: &OutlineView<'_>, width: f64, deadline: &Deadline) -> Result<Vec<bool>, PlanError> {
+    fn dotted(&mut self) -> Result<Vec<bool>, Stopped> {
         let parts = self.parts;
         self.sets = UnionFind::new(parts.len() + self.hidden.len());
         self.last.fill(0);
@@ -190,7 +200,7 @@ impl<'a> Chains<'a> {
         };
         for (i, part) in parts.iter().enumerate().filter(|(_, part)| is_weak(part)) {
             if i % CHECK_EVERY == 0 {
-                deadline.check()?;
+                self.deadline.check()?;
             }
             // The rest of its edge is hidden.
             let is_whole = is_single(i);
@@ -200,37 +210,37 @@ impl<'a> Chains<'a> {
         }
         for i in 0..self.hidden.len() {
             if i % CHECK_EVERY == 0 {
-                deadline.check()?;
+                self.deadline.check()?;
             }
             for end in 0..2 {
                 self.touch(self.hidden[i], end, parts.len() + i);
             }
         }
         let mut lengths = vec![0_u64; parts.len() + self.hidden.len()];
-        let mut add = |sets: &mut UnionFind, member: usize, edge: u32, range: f64| {
-            let place = &self.places[edge as usize];
-            let limit = GAP_MAX * width * view.reach(self.edges[edge as usize].material, place.ends[0][3]);
-            lengths[sets.find(member as u32) as usize] += share(place.way().1 * range, limit);
+        let mut add = |chains: &mut Self, member: usize, edge: u32, range: f64| {
+            let length = chains.places[edge as usize].way().length * range;
+            let limit = GAP_MAX * chains.width(edge as usize);
+            lengths[chains.sets.find(member as u32) as usize] += share(length, limit);
         };
         for (i, part) in parts.iter().enumerate().filter(|(_, part)| is_weak(part)) {
             let range = if is_single(i) { 1.0 } else { part.range[1] - part.range[0] };
-            add(&mut self.sets, i, part.edge, range);
+            add(self, i, part.edge, range);
         }
-        for (i, edge) in self.hidden.iter().enumerate() {
-            add(&mut self.sets, parts.len() + i, *edge, 1.0);
+        for i in 0..self.hidden.len() {
+            add(self, parts.len() + i, self.hidden[i], 1.0);
         }
         Ok((0..parts.len()).map(|i| lengths[self.sets.find(i as u32) as usize] >= LEAST as u64).collect())
     }
 
     /// The lengths of all chains, by the part that represents each. What borders the background is
     /// long enough.
-    fn sums(&mut self, view: &OutlineView<'_>, length: &ChainLength) -> Vec<u64> {
+    fn sums(&mut self) -> Vec<u64> {
         let mut sums = vec![0_u64; self.parts.len()];
         for (i, part) in self.parts.iter().enumerate() {
             let place = &self.places[part.edge as usize];
             let material = self.edges[part.edge as usize].material;
-            let limit = length.least(material, view.reach(material, place.at(part.range[0])[3]));
-            let own = place.way().1 * (part.range[1] - part.range[0]) * part.shown;
+            let limit = self.length.least(material, self.view.reach(material, place.at(part.range[0])[3]));
+            let own = place.way().length * (part.range[1] - part.range[0]) * part.shown;
             let own = if part.is_border { LEAST as u64 } else { share(own, limit) };
             let root = self.sets.find(i as u32) as usize;
             sums[root] += own;

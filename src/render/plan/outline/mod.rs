@@ -27,7 +27,7 @@ pub struct HullPass<'a> {
     /// Premultiplied linear RGBA, by material index; one where all are the same.
     pub colors: Vec<[f32; 4]>,
     /// Corners that are not the mesh's.
-    pub vertices: Vec<HullVertex>,
+    pub vertices: Vec<ScreenVertex>,
     /// Indices into the plan's positions, followed by `vertices`. Those into the positions lie
     /// before the near plane and not far outside the picture, so nothing needs clipping.
     pub triangles: Vec<[u32; 3]>,
@@ -39,10 +39,10 @@ pub struct HullPass<'a> {
     pub triangle_materials: Vec<u32>,
 }
 
-/// A corner on screen.
+/// A vertex on screen, as back-ends have it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct HullVertex {
+pub struct ScreenVertex {
     /// 1/256 px right of the picture's centre, at most 4096 px.
     pub x: i32,
     /// 1/256 px below the centre, at most 4096 px.
@@ -73,7 +73,7 @@ impl HullPass<'_> {
 /// edge and across a face.
 type ScreenPoint = [f64; 4];
 
-impl HullVertex {
+impl ScreenVertex {
     /// The vertex at a point, which lies in the guard band.
     fn snapped([x, y, z, inv_w]: ScreenPoint) -> Self {
         // The clamp is never reached, but NaN must become a number here.

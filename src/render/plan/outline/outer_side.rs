@@ -2,7 +2,7 @@
 
 use crate::plan::Edge;
 use crate::plan::outline::ScreenPoint;
-use crate::plan::outline::screen_edges::{OutlineView, RECEDES, ScreenEdge};
+use crate::plan::outline::screen_edges::{OutlineView, RECEDES, ScreenEdge, Way};
 use crate::plan::outline::silhouette_edges::SilhouetteEdge;
 
 /// Largest slope of an outline that follows a face beyond its edge, so that it lies behind what
@@ -28,18 +28,19 @@ pub struct OuterSide {
 impl OuterSide {
     /// That of an edge; None if its outline has no area.
     pub fn of(view: &OutlineView<'_>, edge: &SilhouetteEdge, place: &ScreenEdge) -> Option<Self> {
-        let (along, length) = place.way();
+        let way = place.way();
         let reach = place.ends.map(|end| view.reach(edge.material, end[3]));
-        if length < 1e-6 || reach[0].max(reach[1]) <= 0.0 {
+        if way.length < 1e-6 || reach[0].max(reach[1]) <= 0.0 {
             return None;
         }
         let out = f64::from(edge.free);
         // It touches the circles around both ends, of which one may be nearer and larger. Where that circle
         // surrounds the other one, the quad is empty and the nearer end's join reaches around.
-        let sine = ((reach[0] - reach[1]) / length).clamp(-1.0, 1.0);
+        let sine = ((reach[0] - reach[1]) / way.length).clamp(-1.0, 1.0);
         let cosine = (1.0 - sine * sine).sqrt();
-        let normal = [sine * along[0] - cosine * out * along[1], sine * along[1] + cosine * out * along[0]];
-        let depths = depths(view, edge, place.ends, [along[0], along[1], length], normal, reach);
+        let [right, down] = way.along;
+        let normal = [sine * right - cosine * out * down, sine * down + cosine * out * right];
+        let depths = depths(view, edge, place.ends, way, normal, reach);
         let ends = [0, 1].map(|k| {
             let at = [0, 1].map(|axis| place.ends[k][axis] + reach[k] * normal[axis]);
             [at[0], at[1], depths[k], place.ends[k][3]]
@@ -58,7 +59,7 @@ fn depths(
     view: &OutlineView<'_>,
     edge: &SilhouetteEdge,
     ends: [ScreenPoint; 2],
-    [right, down, length]: [f64; 3],
+    Way { along: [right, down], length }: Way,
     normal: [f64; 2],
     reach: [f64; 2],
 ) -> [f64; 2] {
@@ -71,7 +72,7 @@ fn depths(
         let [x, y, z, w] = view.homogeneous(*third);
         let from = [x / w - ends[0][0], y / w - ends[0][1]];
         let across = out * (right * from[1] - down * from[0]);
-        let is_known = w >= f64::from(view.view.projection.near_w) && across < -1e-6;
+        let is_known = w >= view.view.projector.near_w(0.0) && across < -1e-6;
         is_known.then(|| (z / w - ends[0][2] - slope_along * (right * from[0] + down * from[1])) / across)
     };
     let slope = edge.faces.iter().filter(|face| **face != Edge::NO_FACE).filter_map(|face| slope(*face));

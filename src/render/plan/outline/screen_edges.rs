@@ -1,14 +1,11 @@
 //! Silhouette edges on screen, cut to what may be in the picture, and how far outlines reach there.
 
-use crate::plan::PlanError;
 use crate::plan::context::PlanContext;
 use crate::plan::edges::select::map;
 use crate::plan::outline::ScreenPoint;
-use crate::plan::outline::silhouette_edges::{ScreenMesh, SilhouetteEdge, near};
+use crate::plan::outline::silhouette_edges::{ScreenMesh, SilhouetteEdge};
+use crate::plan::{PX, PlanError};
 use crate::scene::Thickness;
-
-/// 1/256 px in a pixel.
-pub const PX: f64 = 256.0;
 
 /// The widest outline, pixels: one around something beside the picture still lies in the guard
 /// band.
@@ -29,18 +26,27 @@ pub struct ScreenEdge {
     pub may_show: bool,
 }
 
+/// The way along an edge.
+#[derive(Clone, Copy, Debug)]
+pub struct Way {
+    /// From the first end to the second: a unit vector, or 0 where the length is.
+    pub along: [f64; 2],
+    /// 1/256 px.
+    pub length: f64,
+}
+
 impl ScreenEdge {
     /// The point at a share of the way from the first end to the second.
     pub fn at(&self, share: f64) -> ScreenPoint {
         mix(&self.ends[0], &self.ends[1], share)
     }
 
-    /// Direction and length, 1/256 px; the direction is 0 where the length is.
-    pub fn way(&self) -> ([f64; 2], f64) {
+    /// The way from the first end to the second.
+    pub fn way(&self) -> Way {
         let [a, b] = self.ends;
         let way = [b[0] - a[0], b[1] - a[1]];
         let length = (way[0] * way[0] + way[1] * way[1]).sqrt();
-        (way.map(|v| if length > 0.0 { v / length } else { 0.0 }), length)
+        Way { along: way.map(|v| if length > 0.0 { v / length } else { 0.0 }), length }
     }
 }
 
@@ -106,17 +112,17 @@ impl<'a> OutlineView<'a> {
 
     /// The part of an edge before the near plane whose outline may be in the picture.
     fn on_screen(&self, edge: &SilhouetteEdge) -> Option<ScreenEdge> {
-        let near = self.near();
+        let near_w = self.view.near_w();
         let [a, b] = edge.vertices.map(|v| self.homogeneous(v));
         let mut is_whole = [true; 2];
         let mut ends = [a, b];
         for k in 0..2 {
-            if ends[k][3] < near {
+            if ends[k][3] < near_w {
                 let (inside, outside) = (ends[1 - k], ends[k]);
-                if inside[3] < near {
+                if inside[3] < near_w {
                     return None;
                 }
-                ends[k] = before(near, &inside, &outside);
+                ends[k] = before(near_w, &inside, &outside);
                 is_whole[k] = false;
             }
         }
@@ -134,11 +140,6 @@ impl<'a> OutlineView<'a> {
         Some(ScreenEdge { ends, is_whole: [0, 1].map(|k| is_whole[k] && !cut[k]), may_show: true })
     }
 
-    /// The smallest W on screen.
-    pub fn near(&self) -> f64 {
-        near(&self.view.projection)
-    }
-
     /// X, Y, Z, W.
     #[inline(always)]
     pub fn homogeneous(&self, vertex: u32) -> [f64; 4] {
@@ -147,8 +148,8 @@ impl<'a> OutlineView<'a> {
 }
 
 /// The point between a point before the near plane and one behind it that lies on the plane.
-pub fn before(near: f64, inside: &[f64; 4], outside: &[f64; 4]) -> [f64; 4] {
-    mix(inside, outside, (inside[3] - near) / (inside[3] - outside[3]))
+pub fn before(near_w: f64, inside: &[f64; 4], outside: &[f64; 4]) -> [f64; 4] {
+    mix(inside, outside, (inside[3] - near_w) / (inside[3] - outside[3]))
 }
 
 /// X, Y, Z, W on screen.

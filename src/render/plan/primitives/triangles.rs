@@ -13,7 +13,7 @@ use crate::plan::geometry::Geometry;
 use crate::plan::{CornerValues, PlanError};
 use crate::scene::camera::Camera;
 use crate::scene::{LINE_PX, Scene};
-use crate::spec::{Layers, ProjectionKind};
+use crate::spec::Layers;
 
 /// Radius of a circle over the circumradius of the hexagon that has its area: sqrt(3 sqrt(3) / (2
 /// pi)).
@@ -132,10 +132,8 @@ fn point_px(scene: &Scene<'_, '_>) -> f64 {
 fn seen(scene: &Scene<'_, '_>, point: &LineOrPoint) -> Seen {
     let Scene { mesh, camera, .. } = scene;
     let [width_px, height_px] = scene.size_px().map(f64::from);
-    let p = DVec3::from(mesh.positions[point.ends[0] as usize].map(f64::from));
-    let at = DVec3::from(camera.axes.map(|axis| axis.dot(p)));
-    let is_perspective = camera.kind == ProjectionKind::Perspective;
-    let w = if is_perspective { camera.distance - at.z } else { 1.0 };
+    let at = camera.in_axes(mesh.positions[point.ends[0] as usize]);
+    let w = camera.w(at);
     let px = 2.0 * camera.half_size.y / height_px * w;
     let from_center = (at.truncate() - camera.center) / px;
     // What is behind the viewer is nowhere on screen.
@@ -214,12 +212,12 @@ impl<'m> Builder<'m> {
         let primitive = self.mesh.lines_and_points[i];
         let attributes = self.mesh.line_point_attributes.get(i).copied().unwrap_or_default();
         self.face_viewer(attributes);
-        let [a, b] = [0, 1].map(|k| self.camera_space(primitive.ends[k]));
+        let [a, b] = primitive.ends.map(|v| self.camera.in_axes(self.mesh.positions[v as usize]));
         if primitive.is_point() {
             if let Some(colors) = &mut self.colors {
                 colors.next_point(attributes[0], primitive.material);
             }
-            if self.w(a) >= self.camera.near {
+            if self.camera.w(a) >= self.camera.near {
                 self.point(self.end(a, attributes[0]), primitive);
             }
         } else if let Some([a, b]) = self.in_front(a, b) {
@@ -237,22 +235,13 @@ impl<'m> Builder<'m> {
         }
     }
 
-    fn camera_space(&self, v: u32) -> DVec3 {
-        let p = DVec3::from(self.mesh.positions[v as usize].map(f64::from));
-        DVec3::from(self.camera.axes.map(|axis| axis.dot(p)))
-    }
-
-    fn w(&self, at: DVec3) -> f64 {
-        if self.camera.kind == ProjectionKind::Perspective { self.camera.distance - at.z } else { 1.0 }
-    }
-
     fn end(&self, at: DVec3, attribute: u32) -> End {
-        End { at, px: self.px * self.w(at), attribute }
+        End { at, px: self.px * self.camera.w(at), attribute }
     }
 
     /// The part of a segment in front of the near plane.
     fn in_front(&self, a: DVec3, b: DVec3) -> Option<[DVec3; 2]> {
-        let (wa, wb) = (self.w(a) - self.camera.near, self.w(b) - self.camera.near);
+        let [wa, wb] = [a, b].map(|at| self.camera.w(at) - self.camera.near);
         let cut = || a + (b - a) * (wa / (wa - wb));
         match (wa >= 0.0, wb >= 0.0) {
             (true, true) => Some([a, b]),

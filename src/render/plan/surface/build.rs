@@ -12,7 +12,7 @@ use crate::plan::context::PlanContext;
 use crate::plan::geometry::Geometry;
 use crate::plan::prepared::VertexNormals;
 use crate::plan::primitives::depth_cue;
-use crate::plan::projection::Projection;
+use crate::plan::projection::{Projection, Projector};
 use crate::plan::shared_slice::SharedSlice;
 use crate::plan::skips::SkipKind;
 use crate::plan::{CornerValues, Faces, PlanError, ShadedMaterial, SurfacePass, Textures, flags};
@@ -75,7 +75,7 @@ fn materials_and_textures(
     cx: &mut PlanContext<'_>,
 ) -> Result<(Vec<ShadedMaterial>, Arc<Textures>), PlanError> {
     let mesh = scene.mesh;
-    let mut loader = TextureLoader::new(mesh, cx.budget, cx.deadline);
+    let mut loader = TextureLoader::new(mesh, cx);
     let mut materials = Vec::with_capacity(mesh.materials.len());
     let is_used = used_materials(mesh.materials.len(), geometry);
     for (index, (slot, layers)) in mesh.materials.iter().zip(&scene.groups.by_material).enumerate() {
@@ -87,7 +87,7 @@ fn materials_and_textures(
         materials.push(material);
     }
     let samples = materials.iter().any(materials::samples);
-    if !cx.skips.skip(SkipKind::Textures, !samples, "nothing samples one") && !samples {
+    if !loader.cx.skips.skip(SkipKind::Textures, !samples, "nothing samples one") && !samples {
         for (index, slot) in mesh.materials.iter().enumerate() {
             loader.for_material(index, is_used[index]);
             materials::load_all(slot, &mut loader)?;
@@ -97,8 +97,8 @@ fn materials_and_textures(
     let is_adaptive = scene.spec.image.samples == Samples::Adaptive;
     let has_quarters = is_adaptive && materials.iter().any(ShadedMaterial::is_quartered);
     let size_px = scene.size_px().map(|size| if has_quarters { 2 * size } else { size });
-    let projection = Projection::new(&scene.camera, size_px, true);
-    let loaded = loader.finish(geometry, &projection, cx.prepared, &mut cx.skips)?;
+    let projector = Projector::new(&Projection::new(&scene.camera, size_px));
+    let loaded = loader.finish(geometry, &projector)?;
     materials.iter_mut().for_each(|material| materials::remove_textures(material, mesh, &loaded.broken));
     cx.warnings.extend(fault_warnings(&loaded.faults));
     Ok((materials, loaded.textures))

@@ -27,7 +27,7 @@
 use crate::limits::{Deadline, Stopped};
 use crate::mesh::Mesh;
 use crate::plan::geometry::Geometry;
-use crate::plan::projection::Projection;
+use crate::plan::projection::Projector;
 use crate::plan::surface::samplers::TAPS_MAX;
 
 /// A material's use of a texture.
@@ -50,7 +50,7 @@ pub struct Use {
 pub fn finest_levels(
     mesh: &Mesh,
     geometry: &Geometry<'_>,
-    projection: &Projection,
+    projector: &Projector,
     uses: &[Use],
     count: usize,
     deadline: &Deadline,
@@ -69,7 +69,7 @@ pub fn finest_levels(
             deadline.check()?;
         }
         let Some(list) = of_material.get_mut(material as usize).filter(|list| !list.is_empty()) else { continue };
-        let screen = on_screen(geometry.triangles[t].map(|v| geometry.positions[v as usize]), projection);
+        let screen = on_screen(geometry.triangles[t].map(|v| geometry.positions[v as usize]), projector);
         let corners = geometry.attribute_triangles[t];
         let before = list.len();
         list.retain(|&index| {
@@ -120,23 +120,19 @@ struct OnScreen {
 /// band.
 const MOVED: f64 = 1.5;
 
+/// Corners that are nearer to the near plane, by this share of its distance, may be behind it for a back-end.
+const NEAR_MARGIN: f64 = 1e-6;
+
 /// None where a corner is outside.
-fn on_screen(corners: [[f32; 3]; 3], projection: &Projection) -> Option<OnScreen> {
+fn on_screen(corners: [[f32; 3]; 3], projector: &Projector) -> Option<OnScreen> {
     /// 4096 px, in 1/256 px.
     const GUARD: f64 = 1_048_576.0;
     let mut points = [[0.0; 2]; 3];
     let mut inverse_w = [1.0; 3];
     for k in 0..3 {
-        let row = |row: &[f32; 4]| {
-            let p = corners[k].map(f64::from);
-            let [x, y, z, w] = row.map(f64::from);
-            x * p[0] + y * p[1] + z * p[2] + w
-        };
-        let w = row(&projection.w);
-        points[k] = [row(&projection.x) / w, row(&projection.y) / w];
-        inverse_w[k] = 1.0 / w;
-        let inside = w > f64::from(projection.near_w) * (1.0 + 1e-6);
-        if !(inside && points[k].iter().all(|c| c.abs() < GUARD * 0.999)) {
+        let [x, y, inverse] = projector.on_screen(corners[k], projector.near_w(NEAR_MARGIN))?;
+        (points[k], inverse_w[k]) = ([x, y], inverse);
+        if !points[k].iter().all(|c| c.abs() < GUARD * 0.999) {
             return None;
         }
     }

@@ -21,7 +21,7 @@ pub fn shaded_material(
     mesh: &Mesh,
     slot: &MaterialSlot,
     layers: &Layers,
-    textures: &mut TextureLoader<'_>,
+    textures: &mut TextureLoader<'_, '_>,
 ) -> Result<ShadedMaterial, PlanError> {
     let mut material = ShadedMaterial::unlit([0.0; 4]);
     material.flags = 0;
@@ -49,7 +49,7 @@ pub fn remove_textures(material: &mut ShadedMaterial, mesh: &Mesh, indices: &[u3
 }
 
 /// Loads all textures of a material that samples none.
-pub fn load_all(slot: &MaterialSlot, textures: &mut TextureLoader<'_>) -> Result<(), PlanError> {
+pub fn load_all(slot: &MaterialSlot, textures: &mut TextureLoader<'_, '_>) -> Result<(), PlanError> {
     let all = [
         (&slot.base_texture, true),
         (&slot.metallic_roughness_texture, false),
@@ -154,7 +154,7 @@ fn sample(
     mesh: &Mesh,
     slot: &MaterialSlot,
     surface: &Surface,
-    textures: &mut TextureLoader<'_>,
+    textures: &mut TextureLoader<'_, '_>,
 ) -> Result<(), PlanError> {
     let is_lit = material.flags & (flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::VERTEX_NORMALS) != 0;
     let reads_texture = surface.metallic.is_none() || surface.roughness.is_none();
@@ -189,7 +189,7 @@ fn sample(
 /// The reading of a base texture whose texels below the cutoff are left out. The material's own alpha
 /// multiplies theirs. Where vertices have alphas no cutoff is that of the whole texture: then points are compared with
 /// it.
-fn cut_out(material: &ShadedMaterial, textures: &TextureLoader<'_>) -> Reading {
+fn cut_out(material: &ShadedMaterial, textures: &TextureLoader<'_, '_>) -> Reading {
     if material.flags & flags::VERTEX_COLORS != 0 && textures.has_vertex_alpha() {
         return Reading::plain(true);
     }

@@ -10,10 +10,11 @@ use rayon::prelude::*;
 use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
 use crate::mesh::material::{ImageContent, ImageSource, TextureRef, Wrap};
+use crate::plan::context::PlanContext;
 use crate::plan::geometry::Geometry;
 use crate::plan::prepared::Prepared;
-use crate::plan::projection::Projection;
-use crate::plan::skips::{SkipKind, Skips};
+use crate::plan::projection::Projector;
+use crate::plan::skips::SkipKind;
 use crate::plan::surface::closeup;
 use crate::plan::surface::closeup::Use;
 use crate::plan::{PlanError, TextureUse};
@@ -27,10 +28,10 @@ const TOGETHER_BYTES_MAX: u64 = 256 << 20;
 
 /// Collects the textures that materials sample, and decodes them at the end. An image that cannot be read
 /// is a fault, and the picture goes on without it.
-pub struct TextureLoader<'a> {
+pub struct TextureLoader<'a, 'c> {
+    /// The plan's.
+    pub cx: &'a mut PlanContext<'c>,
     mesh: &'a Mesh,
-    budget: &'a mut Budget,
-    deadline: &'a Deadline,
     material: u32,
     is_used: bool,
     wanted: Vec<Wanted>,
@@ -61,13 +62,12 @@ struct Wanted {
     header: Header,
 }
 
-impl<'a> TextureLoader<'a> {
+impl<'a, 'c> TextureLoader<'a, 'c> {
     /// A loader without textures.
-    pub fn new(mesh: &'a Mesh, budget: &'a mut Budget, deadline: &'a Deadline) -> Self {
+    pub fn new(mesh: &'a Mesh, cx: &'a mut PlanContext<'c>) -> Self {
         Self {
+            cx,
             mesh,
-            budget,
-            deadline,
             material: 0,
             is_used: true,
             wanted: Vec::new(),
@@ -103,7 +103,7 @@ impl<'a> TextureLoader<'a> {
         let Some(index) = self.index_of(texture.image, reading)? else { return Ok(None) };
         let Header { width, height, .. } = self.wanted[index].header;
         let size = [f64::from(width), f64::from(height)];
-        self.budget.spend("textures", 1, 2 * size_of::<Use>() as u64)?;
+        self.cx.budget.spend("textures", 1, 2 * size_of::<Use>() as u64)?;
         let (material, transform) = (self.material, texture.transform);
         self.uses.push(Use { material, texture: index, transform, is_second_uvs, size });
         Ok(Some(TextureUse { transform: texture.transform, texture: index as u32, sampler: sampler(texture) }))
@@ -119,10 +119,10 @@ impl<'a> TextureLoader<'a> {
             return Ok(None);
         };
         // With the sentence of a fault.
-        self.budget.spend("textures", 1, 1024)?;
+        self.cx.budget.spend("textures", 1, 1024)?;
         let index = match decode::header(&source.name, bytes) {
             Ok(header) => {
-                self.budget.spend_texture(&source.name, header.width, header.height)?;
+                self.cx.budget.spend_texture(&source.name, header.width, header.height)?;
                 self.wanted.push(Wanted { image, reading, header });
                 Some(self.wanted.len() - 1)
             }
@@ -136,33 +136,27 @@ impl<'a> TextureLoader<'a> {
     }
 
     /// Decodes all textures that were loaded.
-    pub fn finish(
-        self,
-        geometry: &Geometry<'_>,
-        projection: &Projection,
-        prepared: Option<&Prepared>,
-        skips: &mut Skips<'_>,
-    ) -> Result<LoadedTextures, PlanError> {
-        let Self { mesh, budget, deadline, wanted, uses, faults, .. } = self;
+    pub fn finish(self, geometry: &Geometry<'_>, projector: &Projector) -> Result<LoadedTextures, PlanError> {
+        let Self { cx, mesh, wanted, uses, faults, .. } = self;
         if wanted.is_empty() {
             return Ok(LoadedTextures { faults: faults.into_values().collect(), ..LoadedTextures::default() });
         }
         let sizes: Vec<[u32; 2]> = wanted.iter().map(|w| [w.header.width, w.header.height]).collect();
-        let mut finest = closeup::finest_levels(mesh, geometry, projection, &uses, wanted.len(), deadline)?;
+        let mut finest = closeup::finest_levels(mesh, geometry, projector, &uses, wanted.len(), cx.deadline)?;
         for (level, size) in finest.iter_mut().zip(&sizes) {
             *level = (*level).min(mips::count(size[0], size[1]) - 1);
         }
         let is_unneeded = finest.iter().any(|&level| level > 0);
-        let skip = skips.skip(SkipKind::FineTextureLevels, is_unneeded, "no pixel comes close enough to see them");
+        let skip = cx.skips.skip(SkipKind::FineTextureLevels, is_unneeded, "no pixel comes close enough to see them");
         let first_levels = fit::first_levels(&sizes, &finest, skip);
 
         let texels = |(w, &first): (&Wanted, &u32)| mips::texels(w.header.width, w.header.height, first);
         let total: u64 = wanted.iter().zip(&first_levels).map(texels).sum();
-        budget.spend("textures", total, 8)?;
+        cx.budget.spend("textures", total, 8)?;
         let decoding: Vec<u64> = wanted.iter().map(Wanted::decoding_bytes).collect();
         // Also where nothing is decoded: what is kept must refuse no less.
-        let batches = spend_on_decoding(&decoding, budget)?;
-        let kept = prepared.map(Prepared::textures);
+        let batches = spend_on_decoding(&decoding, cx.budget)?;
+        let kept = cx.prepared.map(Prepared::textures);
         let find = |(w, &first): (&Wanted, &u32)| kept.and_then(|kept| kept.find(w.key(), first));
         let mut decoded: Vec<Option<Decoded>> = wanted.iter().zip(&first_levels).map(find).collect();
         let mut missing = Vec::new();
@@ -171,13 +165,22 @@ impl<'a> TextureLoader<'a> {
             let image = &mesh.images[want.image as usize];
             missing.push(is_missing.then_some(Decoding { image, want, first_level, place }));
         }
-        decode_all(missing, &batches, deadline)?;
+        decode_all(missing, &batches, cx.deadline)?;
         let mut decoded: Vec<Decoded> = decoded.into_iter().flatten().collect();
         if let Some(kept) = kept {
             kept.keep(wanted.iter().map(Wanted::key).zip(&mut decoded));
         }
-        Ok(LoadedTextures::new(&wanted, decoded, (&first_levels, &finest), kept, faults))
+        Ok(LoadedTextures::new(&wanted, decoded, Levels { first: &first_levels, finest: &finest }, kept, faults))
     }
+}
+
+/// The levels that a picture wants of each image.
+#[derive(Clone, Copy)]
+struct Levels<'a> {
+    /// The finest that there is room for.
+    first: &'a [u32],
+    /// The finest that a pixel asks for.
+    finest: &'a [u32],
 }
 
 impl LoadedTextures {
@@ -186,7 +189,7 @@ impl LoadedTextures {
     fn new(
         wanted: &[Wanted],
         decoded: Vec<Decoded>,
-        (first_levels, finest): (&[u32], &[u32]),
+        levels: Levels<'_>,
         kept: Option<&KeptTextures>,
         mut faults: BTreeMap<u32, TextureError>,
     ) -> Self {
@@ -200,7 +203,7 @@ impl LoadedTextures {
             }));
         }
         let mut textures = Textures { images };
-        cut_to_fit(&mut textures, first_levels, finest);
+        cut_to_fit(&mut textures, levels);
         let textures = match kept {
             Some(kept) => kept.shared(wanted.iter().map(Wanted::key).collect(), textures),
             None => Arc::new(textures),
@@ -213,9 +216,9 @@ impl LoadedTextures {
 /// Elsewhere they stay: so pictures from near and from afar have the same textures.
 ///
 /// They would be seen of an image that is to begin with a coarser level than pixels ask for, for lack of room.
-fn cut_to_fit(textures: &mut Textures, first_levels: &[u32], finest: &[u32]) {
+fn cut_to_fit(textures: &mut Textures, levels: Levels<'_>) {
     let is_too_large = textures.texel_count() > fit::TEXELS_MAX;
-    for (texture, (&first, &finest)) in textures.images.iter_mut().zip(first_levels.iter().zip(finest)) {
+    for (texture, (&first, &finest)) in textures.images.iter_mut().zip(levels.first.iter().zip(levels.finest)) {
         if texture.first_level < first && (is_too_large || first > finest) {
             *texture = texture.from_level(first);
         }
@@ -330,10 +333,10 @@ mod tests {
         Texture { width: side, height: side, first_level, levels: mips::count(side, side), texels }
     }
 
-    fn cut(sides: &[u32], kept: &[u32], first_levels: &[u32], finest: &[u32]) -> Vec<u32> {
+    fn cut(sides: &[u32], kept: &[u32], first: &[u32], finest: &[u32]) -> Vec<u32> {
         let images = sides.iter().zip(kept).map(|(&side, &first)| texture(side, first)).collect();
         let mut textures = Textures { images };
-        cut_to_fit(&mut textures, first_levels, finest);
+        cut_to_fit(&mut textures, Levels { first, finest });
         for image in &textures.images {
             assert_eq!(image.texels.len() as u64, mips::texels(image.width, image.height, image.first_level));
         }

@@ -6,7 +6,7 @@ use super::media_type;
 use crate::http::error::ApiError;
 use crate::jobs::{Finished, Job, JobId, JobState, Timings, rfc_3339};
 use meshsnap_render::pipeline::QualitySelection;
-use meshsnap_render::spec::{ADAPTIVE, Samples};
+use meshsnap_render::spec::Samples;
 
 /// The state of a job.
 #[derive(Serialize)]
@@ -74,7 +74,7 @@ struct ChoiceDto {
 #[serde(untagged)]
 enum SamplesDto {
     Fixed(u32),
-    Word(&'static str),
+    Word(String),
 }
 
 /// The reason why a job failed.
@@ -138,7 +138,7 @@ impl SamplesDto {
     fn new(samples: Samples) -> Self {
         match samples {
             Samples::Fixed(samples) => Self::Fixed(samples),
-            Samples::Adaptive => Self::Word(ADAPTIVE),
+            other => Self::Word(other.to_string()),
         }
     }
 }

@@ -8,10 +8,10 @@ use super::body::{self, BodyKind};
 use super::idempotency::{self, Sent};
 use super::keys::Keys;
 use super::query::{Query, bad, quote};
-use super::{access_of, document_of, is_short_json, read_upload, upload, webhook};
+use super::sender::Sender;
+use super::{document_of, read_upload, upload};
 use crate::digest::Digest;
 use crate::http::error::ApiError;
-use crate::http::middleware::observe;
 use crate::http::state::AppState;
 use crate::http::stored_mesh;
 use crate::jobs::{Checking, Class, Job, Recipe, Task, Work};
@@ -36,26 +36,21 @@ pub enum Asked {
 
 /// Reads a request for a verdict. Every fault that shows without reading the mesh is found here.
 pub async fn receive(state: &AppState, request: Request, class: Class) -> Result<Asked, ApiError> {
-    let (access, request_id) = (access_of(&request), observe::id_of(&request));
     body::check_header(request.headers(), state.body_bytes_max)?;
     let (reading, mut keys) = Keys::of_query(request.uri(), &KEYS)?;
     // Before the upload, so that a mistake costs none.
     task(&keys, Digest::of(b""))?;
-    let name = idempotency::name_of(request.headers(), &access.owner)?.filter(|_| class == Class::Batch);
-    let webhook = webhook::of(state, request.headers(), class)?;
-    let is_sent_again = name.as_ref().is_some_and(|name| state.jobs.has_claim(name));
-    if !is_short_json(request.headers()) && !is_sent_again {
-        state.jobs.would_accept(class, &access.owner)?;
-    }
+    let sender = Sender::of(state, &request, class)?;
+    sender.check_room(state, request.headers(), class)?;
     let headers = request.headers().clone();
     let upload = read_upload(state, request).await?;
-    let claim = match name {
+    let claim = match &sender.name {
         None => None,
         Some(name) => {
             let pairs = keys.pairs().iter().cloned().chain([("kind".to_owned(), "check".to_owned())]);
             let query = Query { reading: reading.clone(), overrides: pairs.collect() };
             let digest = idempotency::digest(&query, &upload, &headers).await?;
-            match idempotency::check(state, &name, digest)? {
+            match idempotency::check(state, name, digest)? {
                 Sent::First(claim) => Some(claim),
                 Sent::Again(job) => return Ok(Asked::Known(job)),
             }
@@ -63,7 +58,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     };
     let (work, digest) = if let Some(document) = document_of(&upload, &reading, &headers) {
         let [digest] = keys.add_document(document, &KEYS, ["mesh"])?;
-        let stored = stored_mesh::find(state, Some(&digest.to_string()), &access)?;
+        let stored = stored_mesh::find(state, Some(&digest.to_string()), &sender.access)?;
         let recipe = Recipe { document: None, overrides: keys.pairs().into(), mesh: Some(digest) };
         let work = stored_mesh::work_on(&stored, reading.clone(), task(&keys, digest)?);
         (Work { recipe: Some(Arc::new(recipe)), ..work }, digest)
@@ -77,8 +72,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
         (Work { recipe: Some(Arc::new(recipe)), ..work }, named.digest)
     };
     let key = key(digest, &reading, &keys)?;
-    let work = Box::new(Work { owner: access.owner, request_id, claim, webhook, ..work });
-    Ok(Asked::New { work, key })
+    Ok(Asked::New { work: Box::new(sender.sign(work, claim)), key })
 }
 
 /// The task of these keys on the upload of this name.

@@ -11,10 +11,9 @@ use super::check::Asked;
 use super::idempotency::{self, Sent};
 use super::keys::Keys;
 use super::query::bad;
-use super::{access_of, is_short_json, webhook};
+use super::sender::Sender;
 use crate::digest::Digest;
 use crate::http::error::ApiError;
-use crate::http::middleware::observe;
 use crate::http::state::AppState;
 use crate::http::{negotiate, stored_mesh};
 use crate::jobs::{Class, Comparing, Newer, Recipe, Task, Work};
@@ -57,39 +56,33 @@ struct Meshes {
 
 /// Reads a request for a difference. Every fault that shows without reading the meshes is found here.
 pub async fn receive(state: &AppState, request: Request, class: Class) -> Result<Asked, ApiError> {
-    let (access, request_id) = (access_of(&request), observe::id_of(&request));
     body::check_header(request.headers(), state.body_bytes_max)?;
     let (reading, mut keys) = Keys::of_query(request.uri(), &KEYS)?;
     // Before the upload, so that a mistake costs none.
     Answer::of(state, &keys, form_of_answer(&keys, request.headers())?)?;
-    let name = idempotency::name_of(request.headers(), &access.owner)?.filter(|_| class == Class::Batch);
-    let webhook = webhook::of(state, request.headers(), class)?;
-    let is_sent_again = name.as_ref().is_some_and(|name| state.jobs.has_claim(name));
-    if !is_short_json(request.headers()) && !is_sent_again {
-        state.jobs.would_accept(class, &access.owner)?;
-    }
+    let sender = Sender::of(state, &request, class)?;
+    sender.check_room(state, request.headers(), class)?;
     let headers = request.headers().clone();
     let (bytes, files, time) = (state.body_bytes_max, state.rules.limits.bundle_entries, state.body_timeout);
     let (least_rate, memory) = (state.least_rate, &state.memory);
     let limits = BodyLimits { bytes, files, meshes: None, time, least_rate, memory };
     let meshes = match sides::read(request, limits).await? {
-        sides::Sides::Document(document) => stored(state, &document, &mut keys, &reading, &access)?,
+        sides::Sides::Document(document) => stored(state, &document, &mut keys, &reading, &sender.access)?,
         sides::Sides::Meshes { bundles, reservations } => sent(bundles, reservations, &reading).await?,
     };
     let answer = Answer::of(state, &keys, form_of_answer(&keys, &headers)?)?;
     let key = answer.key(&meshes.digests, &reading);
-    let claim = match name {
+    let claim = match &sender.name {
         None => None,
-        Some(name) => match idempotency::check(state, &name, Digest::of(key.as_bytes()))? {
+        Some(name) => match idempotency::check(state, name, Digest::of(key.as_bytes()))? {
             Sent::First(claim) => Some(claim),
             Sent::Again(job) => return Ok(Asked::Known(job)),
         },
     };
     let mesh = meshes.are_stored.then_some(meshes.digests[0]);
     let recipe = Some(Arc::new(Recipe { document: None, overrides: keys.pairs().into(), mesh }));
-    let task = answer.task(meshes.newer);
-    let work = Work { task, recipe, owner: access.owner, request_id, claim, webhook, ..meshes.older };
-    Ok(Asked::New { work: Box::new(work), key })
+    let work = Work { task: answer.task(meshes.newer), recipe, ..meshes.older };
+    Ok(Asked::New { work: Box::new(sender.sign(work, claim)), key })
 }
 
 /// The stored meshes that a document names.

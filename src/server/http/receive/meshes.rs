@@ -4,14 +4,15 @@ use std::sync::Arc;
 
 use axum::http::HeaderMap;
 
-use super::Sender;
 use super::body::Upload;
 use super::idempotency::{self, Sent};
 use super::query::Query;
+use super::sender::Sender;
+use crate::digest::Digest;
 use crate::http::error::ApiError;
 use crate::http::state::AppState;
 use crate::http::{negotiate, stored_mesh};
-use crate::jobs::{Job, Recipe, Task, Work};
+use crate::jobs::{ClaimName, Job, Recipe, Task, Work};
 use meshsnap_render::import::Bundle;
 use meshsnap_render::request;
 
@@ -30,7 +31,7 @@ pub fn understand(
     query: Query,
     upload: Upload,
     headers: &HeaderMap,
-    sender: &Sender,
+    (sender, named): (&Sender, Option<(&ClaimName, Digest)>),
 ) -> Result<Vec<MeshOfForm>, ApiError> {
     let Query { reading, overrides } = query;
     let mut spec = request::read(upload.document.as_deref(), &overrides, &state.rules)?;
@@ -42,10 +43,10 @@ pub fn understand(
     for (index, file) in upload.bundle.into_files().into_iter().enumerate() {
         let memory = Arc::new(reservation.split(file.bytes.len() as u64));
         let name = file.path.clone();
-        let claim = match &sender.named {
+        let claim = match named {
             None => None,
             Some((named, digest)) => {
-                match idempotency::check(state, &idempotency::name_of_mesh(named, index), *digest)? {
+                match idempotency::check(state, &idempotency::name_of_mesh(named, index), digest)? {
                     Sent::First(claim) => Some(claim),
                     Sent::Again(job) => {
                         meshes.push(MeshOfForm { name, job: Ok(job) });
@@ -57,15 +58,8 @@ pub fn understand(
         let bundle = Bundle::of_files(vec![file]);
         bundle.check_sent().map_err(|error| ApiError::from(&error))?;
         let task = Task::Draw(Box::new(spec.clone()));
-        let work = Work {
-            recipe: Some(recipe.clone()),
-            owner: sender.owner.clone(),
-            request_id: sender.request_id.clone(),
-            webhook: sender.webhook.clone(),
-            claim,
-            ..stored_mesh::work(bundle, reading.clone(), task, memory)
-        };
-        meshes.push(MeshOfForm { name, job: Err(Box::new(work)) });
+        let work = Work { recipe: Some(recipe.clone()), ..stored_mesh::work(bundle, reading.clone(), task, memory) };
+        meshes.push(MeshOfForm { name, job: Err(Box::new(sender.sign(work, claim))) });
     }
     Ok(meshes)
 }

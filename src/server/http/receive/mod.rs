@@ -1,7 +1,7 @@
 //! From a request to work for a worker. The cheapest refusals come first.
 //!
 //! [`query`] reads the query, [`body`] the body within its limits. [`check`] and [`diff`] read requests for
-//! verdicts, by [`keys`] of their own. [`idempotency`] knows what is sent again. [`meshes`]
+//! verdicts, by [`keys`] of their own. [`sender`] knows who sends a request, [`idempotency`] what is sent again. [`meshes`]
 //! makes a job of each mesh of a form.
 //! [`upload`] names what is to be stored. [`webhook`] reads who hears of a job's end.
 
@@ -12,6 +12,7 @@ pub mod idempotency;
 pub mod keys;
 pub mod meshes;
 pub mod query;
+mod sender;
 pub mod upload;
 pub mod webhook;
 
@@ -24,21 +25,17 @@ use self::body::{BodyKind, BodyLimits, Upload};
 use self::idempotency::Sent;
 use self::meshes::MeshOfForm;
 use self::query::Query;
+use self::sender::Sender;
 use super::address::{Address, render_key};
 use super::error::ApiError;
-use super::middleware::observe;
 use super::state::AppState;
 use super::{negotiate, stored_mesh};
 use crate::digest::Digest;
-use crate::jobs::{ClaimName, Class, Job, Owner, Recipe, Task, Work};
+use crate::jobs::{Class, Job, Recipe, Task, Work};
 use crate::keys::Access;
 use crate::store::Reading;
 use meshsnap_render::request;
 use meshsnap_render::spec::Spec;
-
-/// Longest document, bytes, that is read although the queue is full: that of a stored mesh's picture, which
-/// may be in memory.
-const DOCUMENT_BYTES_MAX: u64 = 64 << 10;
 
 /// A request for a picture, once it is read.
 pub enum Reception {
@@ -62,57 +59,39 @@ pub struct Received {
     pub is_negotiated: bool,
 }
 
-/// The party that sends a request, and the names of the request.
-pub struct Sender {
-    owner: Owner,
-    request_id: Arc<str>,
-    webhook: Option<Arc<str>>,
-    /// The name that the client gave it, and its digest.
-    named: Option<(ClaimName, Digest)>,
-}
-
 /// Reads a request for a picture. Every fault that shows without reading the mesh is found here,
 /// before it takes a worker's time. A request for a job may have been accepted before.
 pub async fn receive(state: &AppState, request: Request, class: Class) -> Result<Reception, ApiError> {
-    let (access, request_id) = (access_of(&request), observe::id_of(&request));
     body::check_header(request.headers(), state.body_bytes_max)?;
     let query = Query::read(request.uri(), &state.rules)?;
-    let name = idempotency::name_of(request.headers(), &access.owner)?.filter(|_| class == Class::Batch);
-    let webhook = webhook::of(state, request.headers(), class)?;
+    let sender = Sender::of(state, &request, class)?;
     // Forms and JSON may bring a document. Of every other request, the query is the whole document
     // and is checked before the upload.
     if !body::is_multipart(request.headers()) && !body::is_json(request.headers()) {
         request::read(None, &query.overrides, &state.rules).map_err(query::query_error)?;
     }
-    // A picture that is in memory needs no worker. A document that names its mesh is short.
-    // Nor does a request that was accepted before.
-    let is_sent_again = name.as_ref().is_some_and(|name| state.jobs.has_claim(name));
-    if !is_short_json(request.headers()) && !is_sent_again {
-        state.jobs.would_accept(class, &access.owner)?;
-    }
+    sender.check_room(state, request.headers(), class)?;
 
     let headers = request.headers().clone();
     let meshes = (class == Class::Batch).then(|| state.jobs.accepted_max() as u64);
     let upload = read_body(state, request, meshes).await?;
-    let digest = match &name {
-        Some(_) => Some(idempotency::digest(&query, &upload, &headers).await?),
+    let named = match &sender.name {
+        Some(name) => Some((name, idempotency::digest(&query, &upload, &headers).await?)),
         None => None,
     };
-    let named = name.zip(digest);
     if upload.kind == BodyKind::Meshes {
-        let sender = Sender { owner: access.owner, request_id, webhook, named };
-        return meshes::understand(state, query, upload, &headers, &sender).map(Reception::Many);
+        return meshes::understand(state, query, upload, &headers, (&sender, named)).map(Reception::Many);
     }
-    let claim = match &named {
-        Some((name, digest)) => match idempotency::check(state, name, *digest)? {
+    let claim = match named {
+        Some((name, digest)) => match idempotency::check(state, name, digest)? {
             Sent::First(claim) => Some(claim),
             Sent::Again(job) => return Ok(Reception::Known(job)),
         },
         None => None,
     };
-    let mut received = understand(state, query, upload, &headers, &access)?;
-    received.work = Work { owner: access.owner, request_id, claim, webhook, ..received.work };
-    Ok(Reception::New(Box::new(received)))
+    let Received { work, key, address, is_negotiated } = understand(state, query, upload, &headers, &sender.access)?;
+    let work = sender.sign(work, claim);
+    Ok(Reception::New(Box::new(Received { work, key, address, is_negotiated })))
 }
 
 /// Reads the document of a request, and finds the mesh that it names.
@@ -150,11 +129,6 @@ fn understand(
     let recipe = Some(Arc::new(Recipe { document: upload.document, overrides, mesh: None }));
     let work = Work { recipe, ..stored_mesh::work(upload.bundle, reading, Task::Draw(spec), memory) };
     Ok(Received { work, key: None, address: None, is_negotiated })
-}
-
-/// True for a document that names its mesh, and so is short.
-fn is_short_json(headers: &HeaderMap) -> bool {
-    body::is_json(headers) && body::announced_length(headers).is_some_and(|length| length <= DOCUMENT_BYTES_MAX)
 }
 
 /// What the sender of a request sees.

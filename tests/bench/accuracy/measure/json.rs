@@ -48,7 +48,7 @@ fn row(row: &Row) -> Value {
         "backend": row.back_end,
         "samples": match row.samples {
             Samples::Fixed(samples) => json!(samples),
-            Samples::Adaptive => json!(row.samples.to_string()),
+            other => json!(other.to_string()),
         },
         "thickness": short(row.thickness),
         "median_ms": short(row.median_ms),

@@ -114,7 +114,7 @@ impl Scene {
         let bundle = Bundle::of_one(self.bytes(size_px));
         meshsnap_render::import::import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default())
             .unwrap_or_else(|e| panic!("{}: {e}", self.name))
-            .mesh
+            .0
     }
 
     fn bytes(&self, size_px: u32) -> Vec<u8> {

@@ -12,7 +12,7 @@ use meshsnap_render::image::Image;
 use meshsnap_render::limits::Deadline;
 use meshsnap_render::plan::{DrawPlan, pass_mask};
 
-use crate::support::gpus::{gpus, own_gpus};
+use crate::support::gpus::{gpus, gpus_of_case, own_gpus};
 use crate::support::likeness::{Likeness, Tolerance};
 use crate::support::scenes::{self, SCENES};
 use crate::support::shapes::{self, Random};
@@ -242,20 +242,22 @@ fn crowded_pixels_have_the_same_bytes() {
 /// Both back-ends find the same mixed pixels, and draw them alike. With 64-bit atomics and without.
 #[test]
 fn both_back_ends_draw_the_same_mixed_pixels() {
-    let Some(gpus) = gpus() else { return };
+    if gpus().is_none() {
+        return;
+    }
     let mut cpu = CpuRenderer::new(2);
-    let mut renderers = gpus.each_ref().map(|gpu| GpuRenderer::new(gpu.clone()));
     let mut compared = 0;
     each_plan(|name, plan| {
         let want = draw(&mut cpu, plan);
-        for renderer in &mut renderers {
-            let found = draw(renderer, plan);
+        for gpu in gpus_of_case(compared) {
+            let mut renderer = GpuRenderer::new(gpu.clone());
+            let found = draw(&mut renderer, plan);
             assert_eq!(renderer.draw_times().mixed_pixels, cpu.draw_times().mixed_pixels, "{name}");
             Likeness::of(&found, &want).assert(Tolerance::TWINS, name);
-            compared += 1;
         }
+        compared += 1;
     });
-    assert!(compared > 40, "{compared}");
+    assert!(compared > 20, "{compared}");
 }
 
 /// Pixels that are not mixed have the bytes of fixed samples, and many pixels are not mixed. Metals that mirror sharply are

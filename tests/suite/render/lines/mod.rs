@@ -1,6 +1,7 @@
 //! Lines: their formulas, holes, looks, borders and limits, and line and point primitives.
 
 pub mod borders;
+pub mod floors;
 pub mod formulas;
 pub mod gaps;
 pub mod holes;
@@ -8,6 +9,5 @@ pub mod limits;
 pub mod looks;
 pub mod points;
 pub mod primitives;
-pub mod sheets;
 pub mod shortcuts;
 pub mod tinted;

@@ -13,7 +13,7 @@ use meshsnap_render::plan::{
 };
 
 use crate::render::adaptive::last_of_each;
-use crate::support::gpus::gpus;
+use crate::support::gpus::{gpus, gpus_of_case};
 use crate::support::likeness::{Likeness, Tolerance};
 use crate::support::scenes;
 use crate::support::shapes::{self, Obj};
@@ -103,9 +103,14 @@ fn truth(front: &[usize], background: [f32; 4]) -> [f32; 4] {
     front.iter().rev().fold(over(LINE, behind), |under, &k| over(pane(k), under))
 }
 
-fn renderers() -> Vec<Box<dyn Renderer>> {
+fn cpus() -> Vec<Box<dyn Renderer>> {
     let mut all: Vec<Box<dyn Renderer>> = vec![Box::new(CpuRenderer::plain(1)), Box::new(CpuRenderer::new(2))];
     all.extend(Isa::available().into_iter().map(|isa| Box::new(CpuRenderer::with_isa(1, isa)) as Box<dyn Renderer>));
+    all
+}
+
+fn renderers() -> Vec<Box<dyn Renderer>> {
+    let mut all = cpus();
     all.extend(gpus().into_iter().flatten().map(|gpu| Box::new(GpuRenderer::new(gpu.clone())) as Box<dyn Renderer>));
     all
 }
@@ -271,8 +276,13 @@ fn both_back_ends_tint_alike() {
         &[("style", "wire"), ("camera.eye", "-1.6,0.2,0.1")],
         &[("style", "wire"), ("camera.eye", "-4,1.2,5"), ("outline.method", "hull"), ("outline.thickness", "3")],
     ];
-    let mut renderers = renderers();
-    for look in looks {
+    let mut renderers = cpus();
+    let number_of_cpus = renderers.len();
+    for (number, look) in looks.into_iter().enumerate() {
+        renderers.truncate(number_of_cpus);
+        renderers.extend(
+            gpus_of_case(number).iter().map(|gpu| Box::new(GpuRenderer::new(gpu.clone())) as Box<dyn Renderer>),
+        );
         let keys = last_of_each(&[&glass[..], look].concat());
         let plan = scenes::plan(&mesh, &scenes::spec(&keys));
         let mut untinted = scenes::plan(&mesh, &scenes::spec(&keys));

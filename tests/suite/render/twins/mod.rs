@@ -2,6 +2,7 @@
 
 pub mod flat;
 mod gangs;
+mod linear;
 pub mod pictures;
 pub mod shade;
 mod shared_pixels;

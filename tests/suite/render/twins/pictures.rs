@@ -7,7 +7,7 @@ use meshsnap_render::limits::Deadline;
 use meshsnap_render::plan::ShadedMaterial;
 
 use crate::render::golden;
-use crate::support::gpus::gpus;
+use crate::support::gpus::{gpus, gpus_of_case};
 use crate::support::likeness::{Likeness, Tolerance};
 use crate::support::scenes::{self, SCENES};
 use crate::support::shapes;
@@ -22,8 +22,7 @@ fn pictures_of_the_scenes_agree() {
     for scene in SCENES {
         let cpu = golden::draw(scene, &mut CpuRenderer::new(1));
         assert!(cpu.rgba.chunks(4).any(|pixel| pixel != &cpu.rgba[..4]), "{} is blank", scene.name);
-        // Each device draws every other scene; all scenes in a long run.
-        for gpu in gpus().unwrap().iter().skip(truth::cases(drawn % 2, 0)).take(truth::cases(1, 2)) {
+        for gpu in gpus_of_case(drawn) {
             let mut renderer = GpuRenderer::new(gpu.clone());
             // Twice for some: the second picture comes from buffers that the first has used.
             for _ in 0..truth::cases(1 + usize::from(drawn % 3 == 0), 2) {

@@ -1,6 +1,6 @@
 //! Random triangles to disagree about, and how they are looked at.
 
-use meshsnap_render::plan::{DrawPlan, Faces, HullPass, HullVertex, Projection, ShadedMaterial, SurfacePass};
+use meshsnap_render::plan::{DrawPlan, Faces, HullPass, Projection, ScreenVertex, ShadedMaterial, SurfacePass};
 
 /// xorshift64*: the tests must draw the same soups everywhere.
 pub struct Random(pub u64);
@@ -126,7 +126,7 @@ impl Soup {
             let w = row(&projection.w, p).max(projection.near_w);
             let at = |r, n: f32| (row(r, p) / w + 256.0 * px * n).clamp(-1e6, 1e6).round() as i32;
             let z = row(&projection.z, p) / w * (1.0 + 0.01 * n[2]);
-            HullVertex { x: at(&projection.x, n[0]), y: at(&projection.y, n[1]), z, inv_w: 1.0 / w }
+            ScreenVertex { x: at(&projection.x, n[0]), y: at(&projection.y, n[1]), z, inv_w: 1.0 / w }
         });
         let count = self.positions.len() as u32;
         let both = |t: &[u32; 3]| [[t[0], t[1], count + t[2]], t.map(|v| count + v)];

@@ -2,7 +2,7 @@
 //! comes out.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
-use meshsnap_render::import::{Bundle, Format, ImportReport, Imported, MeshError, Options, import};
+use meshsnap_render::import::{Bundle, Format, ImportReport, MeshError, Options, import};
 use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_render::mesh::Mesh;
 use serde_json::{Value, json};
@@ -15,8 +15,8 @@ pub struct Read {
     pub report: ImportReport,
 }
 
-impl From<Imported> for Read {
-    fn from(Imported { mesh, report, .. }: Imported) -> Self {
+impl From<(Mesh, ImportReport)> for Read {
+    fn from((mesh, report): (Mesh, ImportReport)) -> Self {
         Self { mesh, report }
     }
 }

@@ -3,15 +3,14 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
-
 use super::bin::Bin;
 use super::keep::{Sides, TrianglePass};
 use super::triangle_bins::TriangleBin;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::isa::LANES;
 use crate::backend::cpu::lines::contour;
 use crate::backend::cpu::lines::segment::{PixelBox, Segment};
-use crate::backend::cpu::{CHUNK, RasterContext};
+use crate::backend::cpu::threads::{CHUNK, map};
 use crate::limits::Stopped;
 use crate::plan::{DrawPlan, Edge, Faces, HullPass, LinePass, pass_mask};
 
@@ -218,17 +217,6 @@ fn chunks(range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
 
 fn band_count(plan: &DrawPlan<'_>, rows: u32) -> usize {
     plan.height_px.div_ceil(rows) as usize
-}
-
-fn map<T: Send, U: Send>(
-    pool: Option<&rayon::ThreadPool>,
-    items: Vec<T>,
-    each: impl Fn(T) -> U + Sync + Send,
-) -> Vec<U> {
-    match pool {
-        Some(pool) => pool.install(|| items.into_par_iter().map(each).collect()),
-        None => items.into_iter().map(each).collect(),
-    }
 }
 
 #[cfg(test)]

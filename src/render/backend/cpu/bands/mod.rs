@@ -12,13 +12,15 @@ pub(crate) mod triangle_bins;
 
 use std::ops::ControlFlow;
 
+use half::f16;
+
 use self::bins::{Bins, EdgeBin};
 use self::lists::BandLists;
 use self::scratch::BandScratch;
 use self::triangle_bins::TriangleBin;
+use super::context::RasterContext;
 use super::isa::{LANES, dispatch};
-use super::{RasterContext, resolve};
-use crate::backend::DrawStage;
+use super::resolve;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::batch::Batch;
 use crate::backend::cpu::geometry::nearest::Nearest;
@@ -42,6 +44,7 @@ use crate::backend::cpu::resolve::Resolver;
 use crate::backend::cpu::surface::flat::{draw_flat, shade_flat};
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::cpu::surface::together::shade_band;
+use crate::backend::{DrawStage, linear};
 use crate::plan::{LinePass, OcclusionPass};
 
 /// Edges between two polls of the deadline. Wide lines count their pixels too.
@@ -50,7 +53,6 @@ const EDGES_PER_POLL: usize = 256;
 /// Draws band number `band` into its rows of the picture.
 pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, rgba: &mut [u8]) {
     let (plan, isa) = (context.plan, context.isa);
-    let pixels = rgba.len() / 4;
     let mut lap = context.watch.begin();
     fill_samples(context, scratch, bins, band);
     lap.end(DrawStage::Visibility);
@@ -74,6 +76,37 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
         }
         return;
     }
+    draw_colors(context, scratch, bins, band, rgba.len() / 4);
+    let mut lap = context.watch.begin();
+    resolve::resolve(isa, plan, context.srgb, scratch.samples.shown[0], &scratch.colors, rgba);
+    lap.end(DrawStage::Resolve);
+}
+
+/// Draws band number `band` into its rows of the picture in linear light.
+pub fn draw_linear(
+    context: &RasterContext<'_>,
+    scratch: &mut BandScratch,
+    bins: &Bins,
+    band: usize,
+    rgba: &mut [[f16; 4]],
+) {
+    let mut lap = context.watch.begin();
+    fill_samples(context, scratch, bins, band);
+    lap.end(DrawStage::Visibility);
+    draw_colors(context, scratch, bins, band, rgba.len());
+    let mut lap = context.watch.begin();
+    let width = context.plan.width_px as usize;
+    let rows = scratch.colors.chunks(width).zip(rgba.chunks_mut(width));
+    for (row, (colors, out)) in (scratch.samples.shown[0]..).zip(rows) {
+        linear::write_row(context.plan, row, colors.iter().copied(), out);
+    }
+    lap.end(DrawStage::Resolve);
+}
+
+/// Fills the colours of a band's pixels: all stages between visibility and resolve.
+fn draw_colors(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, pixels: usize) {
+    let (plan, isa) = (context.plan, context.isa);
+    let mut lap = context.watch.begin();
     scratch.colors.clear();
     scratch.colors.resize(pixels, [0.0; 4]);
     if let Some(pass) = plan.peeling() {
@@ -101,8 +134,6 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
         draw_lines(context, scratch, bins, band);
         lap.end(DrawStage::Lines);
     }
-    resolve::resolve(isa, plan, context.srgb, scratch.samples.shown[0], &scratch.colors, rgba);
-    lap.end(DrawStage::Resolve);
 }
 
 /// Draws band number `band` of the visibility buffer, and writes the places of its pixels for the
@@ -205,7 +236,7 @@ fn find_holes(
     }
     holes.reset(samples);
     holes::mark_odd_samples(context.isa, context, samples, holes);
-    if context.is_plain {
+    if context.is_plain() {
         add_holes_plainly(context, pass, triangles, samples, holes);
     } else {
         add_holes(context.isa, context, pass, triangles, samples, holes);
@@ -223,7 +254,7 @@ fn find_points(
     if holes.is_empty() {
         return;
     }
-    if context.is_plain {
+    if context.is_plain() {
         add_points_plainly(context, pass, samples, holes, target);
     } else {
         add_points(context.isa, context, pass, samples, holes, target);
@@ -296,7 +327,7 @@ fn triangles_sampled<const S: usize>(context: &RasterContext<'_>, bins: &Bins, b
             return;
         }
     }
-    if context.is_plain {
+    if context.is_plain() {
         draw_plainly::<S>(context, bins, band, samples, &mut poll);
         return;
     }

@@ -10,7 +10,7 @@ use crate::backend::cpu::lines::holes::Holes;
 use crate::backend::cpu::mixed::draw::MixedScratch;
 use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::peeling::tints::Tints;
-use crate::backend::cpu::surface::flat::FlatColors;
+use crate::backend::cpu::surface::flat_colors::FlatColors;
 use crate::backend::cpu::surface::light::Light;
 use crate::plan::DrawPlan;
 

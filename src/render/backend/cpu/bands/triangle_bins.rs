@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::bin::Bin;
 use super::keep::{Bounds, Sides, TrianglePass, keep};
 use super::lists::{BandLists, TALL_BANDS};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::clip::clip_triangle;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous};
 use crate::backend::cpu::geometry::visibility::{area, passes_culling};

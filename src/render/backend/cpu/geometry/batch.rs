@@ -10,8 +10,8 @@ use super::setups::{Boxes, Setups, class};
 use super::tiles::Tiles;
 use super::visibility;
 use super::visibility::{Parts, Setup};
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::BoxedFace;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::isa::{Isa, LANES, with_simd, with_widest_simd};
 use crate::plan::sample_offsets;
 

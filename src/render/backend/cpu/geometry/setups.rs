@@ -9,7 +9,7 @@ use fearless_simd::{f32x8, i32x4, i32x8, mask32x8};
 use super::samples::{SampleBand, SampleGrid};
 use super::transform::ScreenVertex;
 use super::visibility::Parts;
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::isa::LANES;
 use crate::plan::sample_offsets;
 

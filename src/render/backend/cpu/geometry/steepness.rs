@@ -2,7 +2,7 @@
 //! screen. Twin of `shaders/geometry/steepness.wgsl`.
 
 use super::transform::{ScreenVertex, homogeneous, recip};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 
 /// Smallest ratio of the depth of what lies in front of a line to the line's: covers the rounding of f32.
 pub const NEARER_RATIO: f32 = 1.0 + 1.0 / 524_288.0;

@@ -5,30 +5,11 @@
 //! (docs/rasterizer.md, "Rounded operations").
 
 use crate::backend::cpu::isa::{LANES, dispatch};
-use crate::plan::{HullVertex, Projection};
+use crate::plan::Projection;
+pub use crate::plan::ScreenVertex;
 
 /// Farthest a snapped coordinate may lie from the picture's centre, in 1/256 px: 4096 px.
 pub const GUARD: f32 = 1_048_576.0;
-
-/// A vertex on screen.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct ScreenVertex {
-    /// 1/256 px right of the picture's centre, or [`OUTSIDE`].
-    pub x: i32,
-    /// 1/256 px below the centre.
-    pub y: i32,
-    /// Reversed depth.
-    pub z: f32,
-    /// 1 / W.
-    pub inv_w: f32,
-}
-
-impl From<&HullVertex> for ScreenVertex {
-    fn from(&HullVertex { x, y, z, inv_w }: &HullVertex) -> Self {
-        Self { x, y, z, inv_w }
-    }
-}
 
 /// `x` of a vertex that is behind the near plane or beyond the guard band.
 pub const OUTSIDE: i32 = i32::MIN;

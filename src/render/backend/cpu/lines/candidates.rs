@@ -5,7 +5,7 @@
 //! [`hidden_by`](super::hidden_lines). The few that remain are tested one by one.
 
 use super::segment::Segment;
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::NOTHING;
 use crate::backend::cpu::geometry::steepness::NEARER_RATIO;
 use crate::backend::cpu::geometry::transform::OUTSIDE;

@@ -2,7 +2,7 @@
 //! only silhouettes, and on closed surfaces an edge is dropped if all its faces face away from the
 //! viewer. Twin of `shaders/lines/contour.wgsl`.
 
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous};
 use crate::backend::cpu::geometry::visibility::area;
 use crate::plan::{Edge, FaceSide, LinePass};

@@ -6,7 +6,7 @@
 //! Seen from below, the floor hides the wall. So it has to hide the edge too, though both have the
 //! same depth.
 
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::steepness::{Corner, NEARER_RATIO, sides};
 use crate::backend::cpu::geometry::transform::recip;
 use crate::plan::Edge;

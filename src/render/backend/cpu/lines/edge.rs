@@ -9,7 +9,7 @@ use super::farthest::Farthest;
 use super::holes::Holes;
 use super::segment::{PixelBox, SLACK_PX, Segment, rows};
 use super::stroke::{self, Direction, Mask, Pen, PixelDistances, Places};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::recip;
 use crate::backend::cpu::isa::LANES;
@@ -137,7 +137,7 @@ impl<'a> LineDrawer<'a> {
             let window = Window { segment: &segment, ends: [a, b], number: window, count: windows };
             for i in 0..self.intervals.len() {
                 let piece = Piece::new(&segment, self.intervals[i]);
-                if self.context.is_plain {
+                if self.context.is_plain() {
                     self.draw_piece_plainly(&window, &piece, owner, target);
                 } else {
                     self.draw_piece(&window, &piece, owner, target);
@@ -164,7 +164,7 @@ impl<'a> LineDrawer<'a> {
     /// False if no pixel in the box around an edge gets strokes: found without looking at the edge.
     #[inline(always)]
     pub fn may_draw_in(&self, pixels: Option<&PixelBox>, target: &LineTarget<'_>) -> bool {
-        if self.context.is_plain || !self.only_stroked(target) {
+        if self.context.is_plain() || !self.only_stroked(target) {
             return true;
         }
         pixels.is_none_or(|pixels| {
@@ -230,7 +230,7 @@ impl<'a> LineDrawer<'a> {
         }
         let beyond = (self.pen.reach + 1.0) * segment.inverse_length;
         let range = [(range[0] - beyond).max(0.0), (range[1] + beyond).min(1.0)];
-        if self.context.is_plain {
+        if self.context.is_plain() {
             self.hidden.find_plainly((self.context, self.band), (edge, segment), range);
         } else {
             self.hidden.find((self.context, self.band, &mut *self.farthest), edge, segment, range);

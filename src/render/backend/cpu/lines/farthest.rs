@@ -2,7 +2,7 @@
 //! edge that is farther than this in every pixel along it is hidden, and no triangle has to be
 //! tested.
 
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 

@@ -10,7 +10,7 @@ use super::contour::volume;
 use super::coplanar::HidingTriangle;
 use super::farthest::Farthest;
 use super::segment::Segment;
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::clip::is_moderate;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::steepness::{Corner, NEARER_RATIO, corner, is_far, sides, steepness};

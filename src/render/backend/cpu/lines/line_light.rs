@@ -6,7 +6,7 @@
 //! sample does, as just outside a silhouette, it is the light on the line's own face. Normal and
 //! roughness textures do not change the light on lines.
 
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::surface::barycentric::{Barycentrics, Corners};
 use crate::backend::cpu::surface::light::{Light, light as light_on};

@@ -1,4 +1,5 @@
-//! Lines without any shortcut, for tests that compare pictures with those of the fast code.
+//! Lines without any shortcut, for tests that compare pictures with those of the fast code. Programs leave it out: see
+//! [`RasterContext::is_plain`].
 //! Hidden-line removal tests every triangle that is visible along an edge, one by one, and a stroke
 //! is drawn in every pixel around it.
 
@@ -9,8 +10,8 @@ use super::holes::tips::TipRange;
 use super::holes::{Holes, half_width, looked_at, marks_of_hidden};
 use super::segment::Segment;
 use super::stroke::{self, Mask};
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::setups::Corners;
 use crate::backend::cpu::geometry::steepness::NEARER_RATIO;

@@ -1,7 +1,7 @@
 //! Stage lines, per edge: the edge's ends on screen, and the walk over the pixels along it. Twin of
 //! `shaders/lines/segment.wgsl`.
 
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::clip::clip_segment;
 use crate::backend::cpu::geometry::steepness::NEARER_RATIO;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, round_to_i32, rsqrt};

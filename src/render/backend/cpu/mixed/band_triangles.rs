@@ -5,9 +5,9 @@ use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use super::points::POINT_GRID;
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::{BandLists, BoxedFace, pair};
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 
 /// The triangles of a band.
@@ -65,7 +65,7 @@ impl<'a> BandTriangles<'a> {
     fn boxed_of(&self, list_of: fn(&'a TriangleBin) -> &'a BandLists) -> impl Iterator<Item = Cow<'a, [BoxedFace]>> {
         self.bins.iter().flat_map(move |bin| {
             let (listed, others) = list_of(bin).boxed_in(self.band);
-            if self.context.is_plain {
+            if self.context.is_plain() {
                 // Boxes that culling has no part in.
                 let boxed = |face: &BoxedFace| self.with_box(face.id, &self.get(face.id).corners);
                 return [listed, &others].map(|faces| Cow::Owned(faces.iter().map(boxed).collect()));

@@ -15,7 +15,7 @@ use super::points::{ALL_WORDS, Lattice, PointSet};
 use super::recent::Recent;
 use super::shares::{Share, Shares};
 use super::triangle::PointTriangle;
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::recip;
@@ -64,7 +64,7 @@ fn color_kernel(
 ) {
     let plan = context.plan;
     let surface =
-        plan.surface.as_ref().filter(|surface| surface.is_shaded && !context.is_plain && context.flat.is_none());
+        plan.surface.as_ref().filter(|surface| surface.is_shaded && !context.is_plain() && context.flat.is_none());
     let waiting = surface.map(|surface| Waiting::new(context, surface));
     let mut painter = Painter { context, shader: Shader::new(context), waiting };
     let mut few = Points::<1>::new();
@@ -125,7 +125,7 @@ impl<const W: usize> Points<W> {
     ) {
         let [width, height] = [context.plan.width_px, context.plan.height_px].map(|size| size as i32);
         let corner = [256 * x as i32 - 128 * width, 256 * y as i32 - 128 * height];
-        if let (Some(listed), false) = (listed, context.is_plain) {
+        if let (Some(listed), false) = (listed, context.is_plain()) {
             self.faces.clear();
             let mut has_place = true;
             for triangle in listed {

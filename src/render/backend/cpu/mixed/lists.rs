@@ -6,8 +6,8 @@ use std::ops::Range;
 use super::band_triangles::BandTriangles;
 use super::find::MixedPixels;
 use super::spans::Spans;
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::{BoxedFace, unpair};
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::isa::dispatch;
@@ -189,7 +189,7 @@ fn fill_kernel(
     let mut poll = DeadlinePoll::new(context.deadline);
     'all: for list in triangles.boxed() {
         for triangle in list.iter() {
-            let Some(added) = lists.add(triangles, triangle, pixels, samples, rows, context.is_plain) else {
+            let Some(added) = lists.add(triangles, triangle, pixels, samples, rows, context.is_plain()) else {
                 lists.end = ListsEnd::Full;
                 break 'all;
             };

@@ -1,9 +1,9 @@
-//! Stage occlusion: the place of what each pixel's first sample shows, before the far plane. Twin of
-//! `shaders/occlusion/grid.wgsl`.
+//! Stage occlusion, per pixel: writes the place of its first sample, which is its distance from the far plane towards
+//! the viewer, in pixels. Twin of `shaders/occlusion/grid.wgsl`.
 //!
-//! Every fourth column of a row lies together, because pixels beside each other look at other places: so eight
-//! pixels whose places are loaded together look at the same ones. A border of nothing around the picture saves
-//! asking whether a place lies in it.
+//! In memory, every fourth column of a row lies together: these pixels look around in the same pattern, so that a vector
+//! of eight of them loads its neighbours' places at once. A border of empty places around the picture saves the test
+//! whether a neighbour lies in it.
 
 use std::ops::Range;
 

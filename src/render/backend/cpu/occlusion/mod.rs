@@ -10,8 +10,9 @@ pub mod spread;
 use self::gather::gather_rows;
 use self::grid::Grid;
 use self::spread::spread_rows;
-use super::isa::LANES;
-use super::{RasterContext, run};
+use super::isa::{Isa, LANES};
+use super::threads::map;
+use crate::limits::Deadline;
 use crate::plan::OcclusionPass;
 
 /// Rows that a thread takes at a time.
@@ -40,26 +41,33 @@ impl Occlusion {
         self.grid.bytes() + self.gathered.capacity() * size_of::<f32>() + self.spread.capacity()
     }
 
-    /// Finds what each pixel goes without.
-    pub fn find(&mut self, context: &RasterContext<'_>, pass: &OcclusionPass, pool: Option<&rayon::ThreadPool>) {
+    /// Finds what each pixel goes without, in a picture of so many samples per pixel.
+    pub fn find(
+        &mut self,
+        isa: Isa,
+        samples: u32,
+        pass: &OcclusionPass,
+        deadline: &Deadline,
+        pool: Option<&rayon::ThreadPool>,
+    ) {
         let Self { grid, gathered, spread } = self;
         gathered.resize(grid.depths().len(), 0.0);
         spread.resize((grid.width_px * grid.height_px) as usize, 0);
         let grid = &*grid;
         let picture = grid.picture();
         let rows: Vec<_> = (0..).step_by(ROWS).zip(gathered[picture].chunks_mut(ROWS * grid.stride())).collect();
-        let is_on = || context.deadline.check().is_ok();
+        let is_on = || deadline.check().is_ok();
         let gather = |(first, out): (u32, &mut [f32])| {
             if is_on() {
-                gather_rows(context.isa, pass, grid, context.plan.samples, first, out);
+                gather_rows(isa, pass, grid, samples, first, out);
             }
         };
-        run(pool, rows, gather);
+        map(pool, rows, gather);
         let gathered = &gathered[..];
         let rows = (0..).step_by(ROWS).zip(spread.chunks_mut(ROWS * grid.width_px as usize)).collect();
-        run(pool, rows, |(first, out): (u32, &mut [u8])| {
+        map(pool, rows, |(first, out): (u32, &mut [u8])| {
             if is_on() {
-                spread_rows(context.isa, pass, grid, gathered, first, out);
+                spread_rows(isa, pass, grid, gathered, first, out);
             }
         });
     }

@@ -1,5 +1,5 @@
-//! Stage occlusion, per pixel: a weighted mean of what pixels around it that show the same surface found. Twin of
-//! `shaders/occlusion/spread.wgsl`.
+//! Stage occlusion, per pixel: smooths the darkness of hollows, by a weighted mean over the neighbours that show the same
+//! surface. Twin of `shaders/occlusion/spread.wgsl`.
 
 use super::grid::{Grid, NOWHERE, PHASES, lanes};
 use crate::backend::cpu::geometry::transform::round_to_i32;

@@ -5,8 +5,8 @@
 //! itself: a round finds the greatest word (depth, lowest id) below the last round's, all words
 //! above the visibility buffer's.
 
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
 use crate::backend::cpu::isa::{LANES, dispatch};
 use crate::backend::cpu::peeling::emit_layer::peel_layer;
@@ -40,7 +40,7 @@ pub fn draw(
         }
     }
     // A surface that shows its wires in layers alone differs from one without layers.
-    let is_shaded = !pass.wires_only && !context.is_plain;
+    let is_shaded = !pass.wires_only && !context.is_plain();
     if is_shaded {
         shade_band(context.isa, context, base, colors);
     }

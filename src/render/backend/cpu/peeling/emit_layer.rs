@@ -1,8 +1,8 @@
 //! Stage visibility, one round per peeled layer: finds the nearest triangle behind the previous
 //! layer. Twin of `shaders/peeling/emit_layer.wgsl`.
 
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
 use crate::backend::cpu::geometry::transform::ScreenVertex;

@@ -4,7 +4,7 @@
 //! A layer counts as in front of a line only if it is nearer even when moved down its slope as far as
 //! [`tint_reach`](crate::plan::LinePass::tint_reach) says. Otherwise a line would be behind the faces that it runs along.
 
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::steepness::{NEARER_RATIO, steepness_of};
 use crate::plan::{ALPHA_MIN, DrawPlan, TINTS};
 

@@ -1,7 +1,7 @@
 //! Stage shade, per point: its position in its triangle, for `N` points side by side. Twin of
 //! `shaders/surface/barycentric.wgsl`.
 
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, recip};
 use crate::backend::cpu::vector::part;
 use crate::plan::DrawPlan;

@@ -1,29 +1,18 @@
 //! Stage shade, per triangle: colours that are the same all over a triangle. Each is found once,
 //! eight at a time, and pixels look them up.
 
-use rayon::prelude::*;
-
+use super::flat_colors::{FlatColors, UNKNOWN};
 use super::flat_lanes;
 use super::point::{Show, flat_colors, is_flat};
 use super::shade::Shader;
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
 use crate::backend::cpu::isa::{Isa, LANES, dispatch, with_simd};
 use crate::backend::cpu::resolve::Resolver;
+use crate::backend::cpu::threads::map;
 use crate::backend::cpu::vector::turned_to_viewer;
 use crate::plan::{DrawPlan, SurfacePass, flags};
-
-/// Marks a colour that is computed per pixel: the triangle is clipped, or its colour is not finite
-/// (infinity times a weight of 0 is not 0).
-const UNKNOWN: [f32; 4] = [f32::NAN; 4];
-
-/// Colours by triangle id, for the triangles in the bins.
-#[derive(Default)]
-pub struct FlatColors {
-    /// Premultiplied linear RGBA; after the last triangle's, that of no triangle.
-    colors: Vec<[f32; 4]>,
-}
 
 impl FlatColors {
     /// True if all colours of a plan's visible samples are the same all over a triangle.
@@ -58,28 +47,7 @@ impl FlatColors {
                 find_colors(context.isa, context, bin, own);
             }
         };
-        match pool {
-            Some(pool) => pool.install(|| jobs.into_par_iter().for_each(each)),
-            None => jobs.into_iter().for_each(each),
-        }
-    }
-
-    /// Allocated memory, bytes.
-    pub fn bytes(&self) -> usize {
-        self.colors.capacity() * size_of::<[f32; 4]>()
-    }
-
-    /// The colour of a triangle; None where it has to be found per pixel.
-    #[inline(always)]
-    pub fn known(&self, id: u32) -> Option<[f32; 4]> {
-        let color = self.of(id);
-        (!color[3].is_nan()).then_some(color)
-    }
-
-    #[inline(always)]
-    fn of(&self, id: u32) -> [f32; 4] {
-        let last = self.colors.len().wrapping_sub(1);
-        self.colors.get((id as usize).min(last)).copied().unwrap_or_default()
+        map(pool, jobs, each);
     }
 }
 

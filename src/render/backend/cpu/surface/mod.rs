@@ -8,6 +8,7 @@
 pub(crate) mod barycentric;
 pub(crate) mod debug;
 pub(crate) mod flat;
+pub(crate) mod flat_colors;
 mod flat_lanes;
 pub(crate) mod light;
 pub(crate) mod normal;

@@ -8,7 +8,7 @@ use super::normal::{angle_shares, face_normals, normal_mapped, normals, to_viewe
 use super::occlusion_texture::apply_occlusion_texture;
 use super::texture::{Uv, blend, of_corners, sample, uv_corners};
 use super::wire::{ShadedPoints, edge_mask, fwidth_covers, wire_covers};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, quick_recip};
 use crate::backend::cpu::geometry::visibility::area;
 use crate::backend::cpu::vector::facing;

@@ -6,7 +6,7 @@
 //! each quarter of a pixel.
 
 use super::point::{PointShader, Show};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::recip;
 use crate::plan::{SurfacePass, sample_offsets};

@@ -5,7 +5,7 @@
 
 use super::shade::{Shader, for_each_quarter, for_each_triangle};
 use super::waiting::{Point, Waiting};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
 use crate::backend::cpu::geometry::transform::recip;
 use crate::backend::cpu::isa::{LANES, dispatch};
@@ -25,7 +25,7 @@ fn shade(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32; 4]]
 #[inline(always)]
 fn shade_sampled<const S: usize>(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
     let width = band.size_px[0] as usize;
-    let surface = context.plan.surface.as_ref().filter(|surface| surface.is_shaded && !context.is_plain);
+    let surface = context.plan.surface.as_ref().filter(|surface| surface.is_shaded && !context.is_plain());
     if let Some(surface) = surface {
         shade_together::<S>((context, surface), band, colors);
         return;

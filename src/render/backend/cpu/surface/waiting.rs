@@ -3,7 +3,7 @@
 use super::barycentric::{Barycentrics, Corners};
 use super::point::{Points, Show, is_smooth};
 use super::texture::of_corners;
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::isa::{LANES, dispatch};
 use crate::backend::cpu::vector::part;
 use crate::plan::SurfacePass;

@@ -1,7 +1,7 @@
 //! Stage shade, per point: wires from barycentric coordinates. Twin of `shaders/surface/wire.wgsl`.
 
 use super::barycentric::{Barycentrics, Quad};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::plan::{ShadedMaterial, SurfacePass, flags};
 
 /// `N` shaded points: their triangles and their positions.

@@ -14,10 +14,10 @@ use crate::backend::gpu::schedule::sizes::{
     JOBS_MAX, OCCLUSION_BYTES, SAMPLE_BYTES, color_bytes, is_painted, work_bytes,
 };
 use crate::backend::gpu::staging::Mapped;
-use crate::backend::gpu::{upload_geometry, upload_shading};
+use crate::backend::gpu::upload::{upload_geometry, upload_shading};
 use crate::image::Pixels;
 use crate::limits::Deadline;
-use crate::plan::{DrawPlan, HullVertex};
+use crate::plan::{DrawPlan, ScreenVertex};
 
 /// Distance between the batches of two dispatches: those of all jobs lie together. Every device can bind there.
 const BATCHES_STRIDE: usize = JOBS_MAX * size_of::<Batch>();
@@ -119,7 +119,7 @@ fn submit(
 
 /// Reserves what the kernels write, for all jobs.
 fn reserve(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, all: &Starts) -> Result<(), DrawError> {
-    let vertices = u64::from(all.vertices) * size_of::<HullVertex>() as u64;
+    let vertices = u64::from(all.vertices) * size_of::<ScreenVertex>() as u64;
     buffers.reserve(&gpu.handles, Slot::Vertices, vertices)?;
     buffers.reserve(&gpu.handles, Slot::Samples, u64::from(all.samples) * SAMPLE_BYTES)?;
     buffers.reserve(&gpu.handles, Slot::Work, work_bytes(all.items))?;

@@ -11,7 +11,7 @@ use crate::backend::gpu::residents::Source;
 use crate::backend::gpu::schedule::Schedule;
 use crate::backend::gpu::schedule::sizes::{JOBS_MAX, OCCLUSION_BYTES, SAMPLE_BYTES, work_bytes};
 use crate::backend::gpu::schedule::step::Step;
-use crate::plan::{CornerValues, DrawPlan, HullVertex, MeshToken, ShadedMaterial, SharedSlice};
+use crate::plan::{CornerValues, DrawPlan, MeshToken, ScreenVertex, ShadedMaterial, SharedSlice};
 
 /// Bytes that the kernels of a gang write, at most. Larger pictures keep a GPU busy alone.
 const WRITTEN_BYTES_MAX: u64 = 96 << 20;
@@ -123,7 +123,7 @@ impl Seat for GangShare {
 
 impl Amounts {
     fn bytes(&self) -> u64 {
-        u64::from(self.vertices) * size_of::<HullVertex>() as u64
+        u64::from(self.vertices) * size_of::<ScreenVertex>() as u64
             + u64::from(self.samples) * SAMPLE_BYTES
             + work_bytes(self.items)
             + u64::from(self.pixels) * (4 + 16 + OCCLUSION_BYTES)

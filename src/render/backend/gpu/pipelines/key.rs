@@ -31,8 +31,6 @@ pub const EIGHT_SAMPLES: u32 = 512;
 pub const SIXTEEN_SAMPLES: u32 = 1024;
 /// 4 samples per pixel; without any of the three it is 1.
 pub const FOUR_SAMPLES: u32 = 4096;
-/// Number of samples per pixel.
-pub const SAMPLES: u32 = FOUR_SAMPLES | EIGHT_SAMPLES | SIXTEEN_SAMPLES;
 /// A line pass is lit.
 pub const LIT_LINES: u32 = 8192;
 /// A line pass is a contour.

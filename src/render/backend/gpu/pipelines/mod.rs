@@ -1,13 +1,21 @@
 //! The compute pipelines, made when a plan first needs them.
 
-pub(crate) mod bindings;
 pub(crate) mod file;
 pub(crate) mod kernels;
 pub(crate) mod key;
+pub(crate) mod prune;
+pub(crate) mod reflection;
+pub(crate) mod shaders;
+#[cfg(test)]
+pub(crate) mod tests;
 use std::collections::HashMap;
+use std::hash::Hash;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use bytemuck::CheckedBitPattern;
+
 use self::file::PipelineFile;
+use self::reflection::Reflection;
 use crate::backend::DrawStage;
 
 /// A kernel, in one of its variants.
@@ -99,7 +107,7 @@ pub enum SampleTarget {
 }
 
 /// Buffers by their binding number in group 1 of every shader.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, CheckedBitPattern)]
 #[repr(u32)]
 pub enum Slot {
     Positions,
@@ -145,9 +153,10 @@ pub enum Access {
     ReadWrite,
 }
 
-/// A pipeline and the layout of its group 1.
+/// A pipeline, and the buffers of its group 1 with their layout.
 pub struct Pipeline {
     pub pipeline: wgpu::ComputePipeline,
+    pub slots: Vec<Slot>,
     pub buffers: wgpu::BindGroupLayout,
 }
 
@@ -159,8 +168,8 @@ type MadeOnce<K, T> = Mutex<HashMap<K, Arc<OnceLock<T>>>>;
 #[derive(Default)]
 pub struct Pipelines {
     made: MadeOnce<(Kernel, u32), Arc<Pipeline>>,
-    /// By kernel, without the phase, and by whether gangs share it: its code as wgpu has checked it.
-    modules: MadeOnce<(Kernel, bool), wgpu::ShaderModule>,
+    /// Bits of the key that a kernel depends on, by kernel and by whether gangs share it.
+    key_bits: MadeOnce<(Kernel, bool), u32>,
     /// The driver's own form of the pipelines, kept on disk.
     file: Option<PipelineFile>,
 }
@@ -173,17 +182,21 @@ impl Pipelines {
 
     /// The pipeline of a kernel for a plan with this key.
     pub fn get(&self, device: &wgpu::Device, kernel: Kernel, key: u32) -> Arc<Pipeline> {
-        let key = key & kernel.key_bits();
-        let place =
-            Arc::clone(self.made.lock().unwrap_or_else(PoisonError::into_inner).entry((kernel, key)).or_default());
-        Arc::clone(place.get_or_init(|| Arc::new(self.make(device, kernel, key))))
+        let key = self.key_of(kernel, key);
+        made_once(&self.made, (kernel, key), || {
+            let pipeline = Arc::new(kernel.compile(device, key, self.file.as_ref().map(PipelineFile::cache)));
+            tracing::debug!(?kernel, key, "made a pipeline");
+            pipeline
+        })
     }
 
     /// Those of the kernels that have no pipeline for this key yet.
     pub fn missing(&self, kernels: &[Kernel], key: u32) -> Vec<Kernel> {
-        let made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_made =
-            |kernel: &Kernel| made.get(&(*kernel, key & kernel.key_bits())).is_some_and(|p| p.get().is_some());
+        let is_made = |kernel: &Kernel| {
+            let key = self.key_of(*kernel, key);
+            let made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+            made.get(&(*kernel, key)).is_some_and(|p| p.get().is_some())
+        };
         kernels.iter().copied().filter(|kernel| !is_made(kernel)).collect()
     }
 
@@ -197,17 +210,18 @@ impl Pipelines {
     /// Drops all pipelines; jobs that use one keep it until they end.
     pub fn clear(&self) {
         self.made.lock().unwrap_or_else(PoisonError::into_inner).clear();
-        self.modules.lock().unwrap_or_else(PoisonError::into_inner).clear();
     }
 
-    fn make(&self, device: &wgpu::Device, kernel: Kernel, key: u32) -> Pipeline {
-        let of = (kernel.in_one_phase(), key & key::GANG != 0);
-        let place = Arc::clone(self.modules.lock().unwrap_or_else(PoisonError::into_inner).entry(of).or_default());
-        let module = place.get_or_init(|| kernel.module(device, of.1));
-        let pipeline = kernel.compile(device, key, module, self.file.as_ref().map(PipelineFile::cache));
-        tracing::debug!(?kernel, key, "made a pipeline");
-        pipeline
+    /// The bits of a plan's key that a kernel depends on.
+    fn key_of(&self, kernel: Kernel, key: u32) -> u32 {
+        let is_of_gang = key & key::GANG != 0;
+        key & made_once(&self.key_bits, (kernel, is_of_gang), || kernel.key_bits(is_of_gang))
     }
+}
+
+fn made_once<K: Eq + Hash, T: Clone>(things: &MadeOnce<K, T>, key: K, make: impl FnOnce() -> T) -> T {
+    let place = Arc::clone(things.lock().unwrap_or_else(PoisonError::into_inner).entry(key).or_default());
+    place.get_or_init(make).clone()
 }
 
 /// The layout of group 0: the plan's uniforms, and the dispatch's at a dynamic offset.
@@ -216,7 +230,7 @@ pub fn uniforms_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         layout_entry(
             binding,
             wgpu::BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Uniform,
+                ty: wgpu::BufferBindingType::Storage { read_only: true },
                 has_dynamic_offset,
                 min_binding_size: None,
             },
@@ -249,31 +263,23 @@ impl Kernel {
         }
     }
 
-    /// The kernel's code, checked.
-    fn module(self, device: &wgpu::Device, is_of_gang: bool) -> wgpu::ShaderModule {
-        let source = wgpu::ShaderSource::Wgsl(self.source(is_of_gang).into());
-        device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(self.entry()), source })
-    }
-
-    fn compile(
-        self,
-        device: &wgpu::Device,
-        key: u32,
-        module: &wgpu::ShaderModule,
-        cache: Option<&wgpu::PipelineCache>,
-    ) -> Pipeline {
+    fn compile(self, device: &wgpu::Device, key: u32, cache: Option<&wgpu::PipelineCache>) -> Pipeline {
         let label = Some(self.entry());
-        let entries: Vec<_> = self.buffers().iter().map(|&(slot, access)| buffer_entry(slot, access)).collect();
+        let source = self.source_for(key);
+        let bound = Reflection::of(self.entry(), &source).buffers;
+        let entries: Vec<_> = bound.iter().map(|&(slot, access)| buffer_entry(slot, access)).collect();
         let buffers = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label,
             bind_group_layouts: &[Some(&uniforms_layout(device)), Some(&buffers)],
             immediate_size: 0,
         });
+        let source = wgpu::ShaderSource::Wgsl(source.into());
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source });
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label,
             layout: Some(&layout),
-            module,
+            module: &module,
             entry_point: label,
             compilation_options: wgpu::PipelineCompilationOptions {
                 constants: &self.constants(key),
@@ -282,7 +288,7 @@ impl Kernel {
             },
             cache,
         });
-        Pipeline { pipeline, buffers }
+        Pipeline { pipeline, slots: bound.into_iter().map(|(slot, _)| slot).collect(), buffers }
     }
 }
 

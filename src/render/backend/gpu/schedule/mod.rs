@@ -107,7 +107,7 @@ impl Schedule {
             is_work_empty: true,
         };
         schedule.transform(plan, device)?;
-        let occlusion = plan.occlusion.is_some() && goal == Goal::Picture;
+        let occlusion = plan.occlusion.is_some() && goal.is_shown();
         if occlusion {
             schedule.occlusion(plan, device)?;
         }
@@ -123,7 +123,7 @@ impl Schedule {
             if has_visibility(plan) {
                 schedule.layers(plan, device, band, goal)?;
             }
-            if goal == Goal::Picture {
+            if goal.is_shown() {
                 schedule.picture_stages(plan, device, band, &edge_starts)?;
             }
             schedule.steps.push(Step::EndBand(Band { rows: [band.row_first as u32, band.row_end as u32] }));
@@ -226,14 +226,14 @@ impl Schedule {
     fn layers(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, band: Batch, goal: Goal) -> Result<(), DrawError> {
         let Some(pass) = plan.peeling() else { return Ok(()) };
         let rounds = match goal {
-            Goal::Picture => pass.count_max,
+            Goal::Picture | Goal::Colors => pass.count_max,
             Goal::Samples => 0,
             Goal::Layer(layer) => layer + 1,
         };
         self.layers = rounds;
         let count = plan.width_px * band.row_end.abs_diff(band.row_first);
         // A layer drawn for a test is not shaded, so no sample is finished early.
-        let pass_bit = if goal == Goal::Picture { u32::from(pass_mask::LAYER) } else { 0 };
+        let pass_bit = if goal.is_shown() { u32::from(pass_mask::LAYER) } else { 0 };
         let mut ends = Vec::new();
         for layer in 0..rounds {
             self.steps.push(Step::ClearLayer);
@@ -241,7 +241,7 @@ impl Schedule {
             let batch = Batch { count, pass_bit, layer, ..band };
             self.dispatch(device, Kernel::Composite, count, batch)?;
             self.steps.push(Step::Submit);
-            if self.tiles.in_rounds && goal == Goal::Picture {
+            if self.tiles.in_rounds && goal.is_shown() {
                 ends.push(self.steps.len());
                 self.steps.push(Step::EndLayer { layer, end: 0 });
             }
@@ -320,7 +320,7 @@ impl Schedule {
     ) -> Result<(), DrawError> {
         let count = plan.width_px * band.row_end.abs_diff(band.row_first);
         let pixels = Batch { count, ..band };
-        if is_painted(plan) {
+        if self.is_painted(plan) {
             return self.dispatch(device, Kernel::Paint, count, pixels);
         }
         if plan.is_shaded() {
@@ -330,7 +330,15 @@ impl Schedule {
             self.mixed(plan, device, pixels)?;
         }
         self.lines(plan, device, pixels, edge_starts)?;
-        self.dispatch(device, Kernel::Resolve, count, pixels)
+        match self.goal {
+            Goal::Picture => self.dispatch(device, Kernel::Resolve, count, pixels),
+            _ => Ok(()),
+        }
+    }
+
+    /// True if one kernel makes the picture of the visibility buffer, and no colours are kept in between.
+    pub fn is_painted(&self, plan: &DrawPlan<'_>) -> bool {
+        self.goal == Goal::Picture && is_painted(plan)
     }
 
     /// The mixed pixels of a band.

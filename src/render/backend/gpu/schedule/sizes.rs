@@ -103,7 +103,7 @@ impl Banding {
     /// picture have no room, they are left out: a line at the border that something beyond it hides
     /// may then show.
     pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Result<Self, DrawError> {
-        if goal != Goal::Picture {
+        if !goal.is_shown() {
             return Self::with_margin(plan, device, [0, 0]);
         }
         let margin = plan.margin_rows();

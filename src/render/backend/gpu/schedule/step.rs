@@ -72,8 +72,17 @@ pub struct Band {
 pub enum Goal {
     /// The picture.
     Picture,
+    /// The colours of its pixels, which stage resolve puts over the background.
+    Colors,
     /// The visibility buffer alone.
     Samples,
     /// One layer alone.
     Layer(u32),
+}
+
+impl Goal {
+    /// True if all is drawn that a picture shows.
+    pub fn is_shown(self) -> bool {
+        matches!(self, Self::Picture | Self::Colors)
+    }
 }

@@ -117,7 +117,7 @@ impl<'a> Buffers<'a> {
         // As it comes, and as it is kept.
         cx.budget.spend("compressed glTF data", total_bytes, 2)?;
         let parts: Vec<_> = views.iter().map(|(_, packed, from)| (*packed, from.bytes())).collect();
-        let unpacked = meshopt_apart::read(&parts, isolation, (cx.budget, cx.deadline))?;
+        let unpacked = meshopt_apart::read(&parts, isolation, cx)?;
         self.unpacked.extend(views.iter().map(|(number, ..)| *number).zip(unpacked));
         Ok(())
     }

@@ -56,6 +56,7 @@ pub fn decode(
 
 /// What a view holds.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct Packed {
     /// Its kind.
     pub mode: Mode,
@@ -106,6 +107,7 @@ fn broken(index: usize, what: &str) -> MeshError {
 
 /// What is packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub enum Mode {
     /// Vertices.
     Attributes,

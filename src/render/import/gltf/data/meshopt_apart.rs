@@ -1,13 +1,11 @@
 //! Unpacks views that meshoptimizer has packed in another process: many views in one order, because each order costs a
 //! process.
 
-use serde::{Deserialize, Serialize};
-
-use super::meshopt::{DECODER, Mode, Packed, Unpacked, unpack};
+use super::meshopt::{DECODER, Packed, Unpacked, unpack};
 use crate::guard::{Panicked, guarded};
+use crate::import::context::Context;
 use crate::import::isolate::{self, Isolation, Order};
 use crate::import::{MeshError, MeshFault};
-use crate::limits::{Budget, Deadline};
 
 /// Most unpacked bytes of views that are unpacked before they are asked for.
 pub const AHEAD_BYTES_MAX: u64 = 64 << 20;
@@ -15,40 +13,26 @@ pub const AHEAD_BYTES_MAX: u64 = 64 << 20;
 const BESIDE_BYTES: u64 = 1 << 20;
 
 /// One view: what it holds, and how many bytes of the file are its own.
-#[derive(Serialize, Deserialize)]
-struct Part {
-    mode: u8,
-    count: u64,
-    stride: u64,
-    packed_bytes: u64,
-}
+type Part = (Packed, u64);
 
 /// [`Unpacked`] as it is sent.
 type Answer = Result<Option<Vec<u8>>, ()>;
-
-const MODES: [Mode; 3] = [Mode::Attributes, Mode::Triangles, Mode::Indices];
 
 /// Unpacks views in the other process.
 pub fn read(
     views: &[(Packed, &[u8])],
     isolation: &dyn Isolation,
-    (budget, deadline): (&Budget, &Deadline),
+    cx: &Context<'_>,
 ) -> Result<Vec<Unpacked>, MeshError> {
-    let part = |&(Packed { mode, count, stride }, bytes): &(Packed, &[u8])| Part {
-        mode: MODES.iter().position(|&one| one == mode).unwrap_or_default() as u8,
-        count: count as u64,
-        stride,
-        packed_bytes: bytes.len() as u64,
-    };
-    let parts: Vec<Part> = views.iter().map(part).collect();
+    let parts: Vec<Part> = views.iter().map(|(packed, bytes)| (*packed, bytes.len() as u64)).collect();
     let foul = || MeshError::new(MeshFault::DecoderCrashed, "the decoder of this format answered with nonsense");
     let mut head = vec![isolate::MESHOPT];
     head.extend(postcard::to_stdvec(&parts).map_err(|_| foul())?);
     let file = views.iter().map(|(_, bytes)| *bytes).collect::<Vec<_>>().concat();
     let unpacked_bytes = views.iter().map(|(packed, _)| packed.bytes()).fold(0, u64::saturating_add);
     let memory_bytes = unpacked_bytes.saturating_mul(3).saturating_add(BESIDE_BYTES);
-    let lend = |bytes| budget.lend_beside(bytes);
-    let answer = isolation.decode(&Order { head: &head, file: &file, memory_bytes, lend: &lend }, deadline)?;
+    let lend = |bytes| cx.budget.lend_beside(bytes);
+    let answer = isolation.decode(&Order { head: &head, file: &file, memory_bytes, lend: &lend }, cx.deadline)?;
     let all: Vec<Answer> = postcard::from_bytes(&answer).map_err(|_| foul())?;
     let fits = |one: &Answer, packed: &Packed| match one {
         Ok(Some(bytes)) => bytes.len() as u64 == packed.bytes(),
@@ -65,13 +49,10 @@ pub fn answer(head: &[u8], file: &[u8]) -> Vec<u8> {
     let parts: Vec<Part> = postcard::from_bytes(head).unwrap_or_default();
     let mut rest = file;
     let mut all: Vec<Answer> = Vec::with_capacity(parts.len());
-    for part in parts {
-        let (bytes, after) = rest.split_at_checked(part.packed_bytes as usize).unwrap_or((rest, &[]));
+    for (packed, packed_bytes) in parts {
+        let (bytes, after) = rest.split_at_checked(packed_bytes as usize).unwrap_or((rest, &[]));
         rest = after;
-        let mode = MODES.get(usize::from(part.mode)).copied();
-        let unpack =
-            || mode.and_then(|mode| unpack(Packed { mode, count: part.count as usize, stride: part.stride }, bytes));
-        all.push(guarded(DECODER, unpack).map_err(drop));
+        all.push(guarded(DECODER, || unpack(packed, bytes)).map_err(drop));
     }
     postcard::to_stdvec(&all).unwrap_or_default()
 }

@@ -1,12 +1,11 @@
 //! Any line of an OBJ text, word by word. Harmless content is dropped or completed: bytes that are
 //! not UTF-8, empty faces, partial colours.
 
-use super::decimal;
 use super::numbers::{opaque, upright};
 use super::{CORNERS_PER_POLL, Parser, PartError};
 use crate::import::obj::face::{Counts, MISSING, parse_corner, show};
 use crate::import::obj::lines::{Lines, uncommented};
-use crate::import::text::{before_comment, is_c_nan};
+use crate::import::text::{self, before_comment, is_c_nan};
 use crate::mesh::primitives::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
 use std::borrow::Cow;
 
@@ -88,7 +87,7 @@ impl<'t> Parser<'t, '_, '_> {
         for (i, value) in values.iter_mut().enumerate() {
             *value = match words.next() {
                 Some(word) if is_c_nan(word) => f64::NAN,
-                Some(word) if word.is_ascii() => decimal::parse(word).unwrap_or_else(|| {
+                Some(word) if word.is_ascii() => text::number(word).unwrap_or_else(|| {
                     is_number = false;
                     f64::NAN
                 }),
@@ -237,7 +236,7 @@ fn color_of(all: &[&[u8]; 7], count: usize) -> Option<[f64; 3]> {
 }
 
 fn finite(word: &[u8]) -> Option<f64> {
-    decimal::parse(word).filter(|v| v.is_finite())
+    text::number(word).filter(|v| v.is_finite())
 }
 
 /// The name after a keyword of six letters, including its spaces.

@@ -10,7 +10,7 @@ fn counts(obj: &str) -> [usize; 4] {
     let limits = Limits::default();
     let mut budget = Budget::new(&limits);
     let bundle = crate::import::Bundle::of_one(obj.as_bytes().to_vec());
-    let mesh = crate::import::import(&bundle, None, &limits, &mut budget, &Deadline::default()).unwrap().mesh;
+    let mesh = crate::import::import(&bundle, None, &limits, &mut budget, &Deadline::default()).unwrap().0;
     let list = EdgeList::of(&mesh, &mut budget).unwrap();
     let limit = sharp_cos(30.0);
     [Class::Feature(limit), Class::Crease(limit), Class::Boundary, Class::Nonmanifold]

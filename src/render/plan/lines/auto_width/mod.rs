@@ -6,8 +6,7 @@ pub use open_edges::open_edges;
 
 use crate::mesh::Mesh;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
-use crate::plan::projection::row_dot;
-use crate::plan::{PlanError, Projection};
+use crate::plan::{PX, PlanError, Projection, Projector};
 use crate::scene::Scene;
 
 /// Share of the faces that lines cover at most, on average over their area on screen.
@@ -122,7 +121,7 @@ fn diameter_of(class: usize) -> f64 {
 /// A mesh as it is seen.
 struct View<'a> {
     mesh: &'a Mesh,
-    projection: Projection,
+    projector: Projector,
     /// Half the picture's width and height.
     half_px: [f64; 2],
     are_polygons: bool,
@@ -130,9 +129,9 @@ struct View<'a> {
 
 impl<'a> View<'a> {
     fn new(scene: &Scene<'a, '_>, are_polygons: bool) -> Self {
-        let projection = Projection::new(&scene.camera, scene.size_px(), true);
+        let projector = Projector::new(&Projection::new(&scene.camera, scene.size_px()));
         let half_px = scene.size_px().map(|px| 0.5 * f64::from(px));
-        Self { mesh: scene.mesh, projection, half_px, are_polygons }
+        Self { mesh: scene.mesh, projector, half_px, are_polygons }
     }
 
     /// The area of a face on screen and the diameter of its inscribed circle, pixels.
@@ -165,9 +164,8 @@ impl<'a> View<'a> {
 
     /// A vertex on screen, pixels from the centre; None behind the near plane.
     fn place_of(&self, vertex: u32) -> Option<[f64; 2]> {
-        let p = self.mesh.positions[vertex as usize];
-        let [x, y, w] = [&self.projection.x, &self.projection.y, &self.projection.w].map(|row| row_dot(row, p));
-        (w >= f64::from(self.projection.near_w)).then(|| [x / w / 256.0, y / w / 256.0])
+        let [x, y, _] = self.projector.on_screen(self.mesh.positions[vertex as usize], self.projector.near_w(0.0))?;
+        Some([x / PX, y / PX])
     }
 }
 

@@ -17,7 +17,7 @@ fn lines(n: usize, are_polygons: bool) -> AutoWidth {
     let limits = Limits::default();
     let mut budget = Budget::new(&limits);
     let bundle = Bundle::of_one(obj.into_bytes());
-    let mesh = import::import(&bundle, None, &limits, &mut budget, &Deadline::default()).unwrap().mesh;
+    let mesh = import::import(&bundle, None, &limits, &mut budget, &Deadline::default()).unwrap().0;
     let keys = [("size", "120"), ("view", "front"), ("camera.projection", "orthographic"), ("camera.margin", "0")];
     let keys = keys.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Cpu };

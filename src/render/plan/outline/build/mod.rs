@@ -10,10 +10,10 @@ use crate::plan::geometry::Geometry;
 use crate::plan::outline::outer_side::OuterSide;
 use crate::plan::outline::parts::{OutlineParts, outlines};
 use crate::plan::outline::round_join::RoundJoins;
-use crate::plan::outline::screen_edges::{OutlineView, ScreenEdge};
+use crate::plan::outline::screen_edges::{OutlineView, ScreenEdge, Way};
 use crate::plan::outline::silhouette_edges::{ScreenMesh, SilhouetteEdge};
 use crate::plan::outline::visible_parts::VisiblePart;
-use crate::plan::outline::{EdgeEnd, HullPass, HullVertex, ScreenPoint};
+use crate::plan::outline::{EdgeEnd, HullPass, ScreenPoint, ScreenVertex};
 use crate::plan::peeling::needed_pass;
 use crate::plan::shared_slice::SharedSlice;
 use crate::scene::{Scene, Thickness};
@@ -82,7 +82,7 @@ impl<'a> OutlineMesh<'a> {
         // Joins keep both ends, also of edges without a visible part.
         let OutlineParts { edges, places, drawn: visible, .. } = parts;
         let most = edges.len() + visible.len();
-        let bytes = 4 * size_of::<HullVertex>() + 2 * (size_of::<[u32; 3]>() + 4) + 2 * size_of::<EdgeEnd>();
+        let bytes = 4 * size_of::<ScreenVertex>() + 2 * (size_of::<[u32; 3]>() + 4) + 2 * size_of::<EdgeEnd>();
         cx.budget.spend("an outline's strips", most as u64, bytes as u64)?;
         cx.budget.spend("an outline's strips", view.view.mesh.positions.len() as u64 / 8 + 8, 1)?;
         let hull = HullPass {
@@ -114,7 +114,7 @@ impl<'a> OutlineMesh<'a> {
     /// Adds the offset quads beside the visible parts of an edge.
     fn offset_quads(&mut self, edge: &SilhouetteEdge, place: &ScreenEdge, parts: &[VisiblePart]) {
         let Some(side) = OuterSide::of(self.view, edge, place) else { return };
-        let ([a, b], (along, length)) = (place.ends, place.way());
+        let ([a, b], Way { along, length }) = (place.ends, place.way());
         let out = f64::from(edge.free);
         let mut outer = [None; 2];
         for part in parts {
@@ -171,7 +171,7 @@ impl<'a> OutlineMesh<'a> {
 
     /// A new vertex of the hull.
     fn vertex(&mut self, point: ScreenPoint) -> u32 {
-        self.hull.vertices.push(HullVertex::snapped(point));
+        self.hull.vertices.push(ScreenVertex::snapped(point));
         self.first_vertex + self.hull.vertices.len() as u32 - 1
     }
 }

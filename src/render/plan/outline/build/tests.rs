@@ -19,7 +19,7 @@ fn triangles(count: usize) -> Mesh {
     }
     let limits = Limits::default();
     let bundle = Bundle::of_one(obj.into_bytes());
-    import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap().mesh
+    import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap().0
 }
 
 fn canvas(scene: &Scene<'_, '_>) -> Canvas {
@@ -57,7 +57,7 @@ fn a_hull_takes_no_more_than_it_spends() {
             + size_of::<VisiblePart>() * parts.drawn.capacity()
             + 2 * size_of::<EdgeEnd>() * edges.len()
             + mesh.triangles.len()
-            + size_of::<HullVertex>() * hull.vertices.capacity()
+            + size_of::<ScreenVertex>() * hull.vertices.capacity()
             + 12 * hull.triangles.capacity()
             + 4 * hull.triangle_materials.capacity();
         let spent = cx.budget.spent_bytes() - before;

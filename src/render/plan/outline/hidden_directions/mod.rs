@@ -130,7 +130,7 @@ fn arcs(ends: &[EdgeEnd], view: &ScreenMesh<'_>, cx: &mut PlanContext<'_>) -> Re
     let is_near = map(&view.runs.runs, cx.deadline, |run| u8::from(near_ends.meets(&run.bounds)))?;
     let mut runs = Vec::with_capacity(is_near.len());
     runs.extend(is_near.iter().zip(0_u32..).filter(|(is_near, _)| **is_near == 1).map(|(_, r)| r));
-    let corners = select_by("an outline's corners", [runs.len(), RUNS], cx, |range, found| {
+    let corners = select_by("an outline's corners", runs.len(), RUNS, cx, |range, found| {
         for face in runs[range].iter().flat_map(|&r| FaceRuns::faces(r as usize, view.mesh.triangles.len())) {
             let triangle = view.mesh.triangles[face];
             (0..3_u32).filter(|&k| is_listed(triangle[k as usize])).for_each(|k| found([face as u32, k]));

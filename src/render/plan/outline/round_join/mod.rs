@@ -10,7 +10,7 @@ use crate::plan::context::{CHECK_EVERY, PlanContext};
 use crate::plan::outline::hidden_directions::{HiddenDirections, wrapped};
 use crate::plan::outline::silhouette_edges::ScreenMesh;
 use crate::plan::outline::sort::sort;
-use crate::plan::outline::{EdgeEnd, HullPass, HullVertex};
+use crate::plan::outline::{EdgeEnd, HullPass, ScreenVertex};
 
 /// Largest distance of an arc from its chords, 1/256 px: 1/64 px.
 const SAGITTA: f64 = 4.0;
@@ -236,7 +236,7 @@ fn draw(ends: &[EdgeEnd], join: &Join, coarser: f64, first: u32, hull: &mut Hull
         let reach = from.reach + share * (reach - from.reach);
         let at = [libm::cos(angle), libm::sin(angle)];
         let [x, y] = [0, 1].map(|k| from.middle[k] + reach * at[k]);
-        hull.vertices.push(HullVertex::snapped([x, y, from.depth + share * (depth - from.depth), from.inv_w]));
+        hull.vertices.push(ScreenVertex::snapped([x, y, from.depth + share * (depth - from.depth), from.inv_w]));
         first + hull.vertices.len() as u32 - 1
     };
     let count = chords(ends, join, coarser);

@@ -13,13 +13,16 @@ use crate::plan::edges::face_runs::{FACES, FaceRuns};
 use crate::plan::edges::select::{map, select_by};
 use crate::plan::edges::silhouettes::Silhouettes;
 use crate::plan::edges::view_of_runs::RunView;
-use crate::plan::projection::Rows;
-use crate::plan::{Edge, PlanError, Projection};
+use crate::plan::{Edge, PlanError, Projection, Projector};
 use crate::scene::{Fill, MaterialGroups, Scene, Thickness};
 use crate::spec::Cull;
 
 /// Runs of faces that a thread takes at a time.
 const RUNS: usize = 128;
+
+/// Outlines are cut at a plane that is farther than the near plane by this share of its distance: no corner of theirs is
+/// behind the near plane for being rounded to f32.
+const NEAR_MARGIN: f64 = 1e-5;
 
 /// An edge beside which an outline is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Zeroable)]
@@ -43,7 +46,8 @@ pub struct ScreenMesh<'a> {
     pub mesh: &'a Mesh,
     /// The view.
     pub projection: Projection,
-    rows: Rows,
+    /// The same in f64.
+    pub projector: Projector,
     /// The runs of its faces.
     pub runs: Arc<FaceRuns>,
     /// The same view of runs of faces.
@@ -60,18 +64,18 @@ impl<'a> ScreenMesh<'a> {
     /// Projects the mesh of a scene.
     pub fn new(scene: &Scene<'a, '_>, cx: &mut PlanContext<'_>) -> Result<Self, PlanError> {
         let (mesh, groups) = (scene.mesh, &scene.groups);
-        let projection = Projection::new(&scene.camera, scene.size_px(), true);
+        let projection = Projection::new(&scene.camera, scene.size_px());
+        let projector = Projector::new(&projection);
         let runs = cx.face_runs(mesh)?;
         let PlanContext { budget, deadline, .. } = cx;
         budget.spend("an outline", runs.runs.len() as u64, 1 + 4)?;
         budget.spend("an outline", mesh.triangles.len() as u64, 1)?;
         budget.spend("materials", groups.material_count() as u64, 1)?;
-        let run_view = RunView::new(mesh, &projection, near(&projection));
+        let run_view = RunView::new(mesh, projector, projector.near_w(NEAR_MARGIN));
         let sides = map(&runs.runs, deadline, |run| run_view.side(run))?;
         let mut facings = vec![0_i8; mesh.triangles.len()];
         let pieces = facings.chunks_mut(RUNS * FACES).zip(sides.chunks(RUNS)).enumerate();
-        let rows = Rows::new(&projection);
-        let places = Places { mesh, rows, rounded: run_view.rounded };
+        let places = Places { mesh, projector, rounded: run_view.rounded };
         let fill = |(piece, (facings, sides)): (usize, (&mut [i8], &[i8]))| {
             deadline.check()?;
             let runs = facings.chunks_mut(FACES).zip(sides).zip((piece * RUNS * FACES..).step_by(FACES));
@@ -89,21 +93,24 @@ impl<'a> ScreenMesh<'a> {
         let mut open_runs = Vec::with_capacity(runs.runs.len());
         open_runs.extend((0..runs.runs.len() as u32).filter(is_open));
         let culls = (0..groups.material_count()).map(|m| cull(groups, m)).collect();
-        Ok(Self { mesh, projection, rows, runs, run_view, facing: facings, open_runs, culls })
+        Ok(Self { mesh, projection, projector, runs, run_view, facing: facings, open_runs, culls })
     }
 
     /// X, Y, Z and W of a position.
     #[inline(always)]
     pub fn homogeneous(&self, vertex: u32) -> [f64; 4] {
-        let p = self.mesh.positions[vertex as usize];
-        let [x, y, w] = self.rows.place(p);
-        [x, y, self.rows.depth(p), w]
+        self.projector.homogeneous(self.mesh.positions[vertex as usize])
+    }
+
+    /// The smallest W of what has an outline.
+    pub fn near_w(&self) -> f64 {
+        self.projector.near_w(NEAR_MARGIN)
     }
 
     /// X, Y and W of a position.
     #[inline(always)]
     pub fn place(&self, vertex: u32) -> [f64; 3] {
-        self.rows.place(self.mesh.positions[vertex as usize])
+        self.projector.place(self.mesh.positions[vertex as usize])
     }
 
     /// The silhouette edges of the materials that have an outline (`outlines`, by material).
@@ -114,7 +121,7 @@ impl<'a> ScreenMesh<'a> {
         silhouettes: &Silhouettes,
         cx: &mut PlanContext<'_>,
     ) -> Result<Vec<SilhouetteEdge>, PlanError> {
-        select_by("an outline's edges", [self.open_runs.len(), RUNS], cx, |range, found| {
+        select_by("an outline's edges", self.open_runs.len(), RUNS, cx, |range, found| {
             for i in self.open_runs[range].iter().flat_map(|&run| self.runs.edges(run as usize)) {
                 let edge = list.get(i);
                 if self.is_surely_inside(&edge) {
@@ -200,15 +207,10 @@ fn cull(groups: &MaterialGroups<'_>, material: usize) -> Cull {
     }
 }
 
-/// The smallest W on screen.
-pub fn near(projection: &Projection) -> f64 {
-    f64::from(projection.near_w) * (1.0 + 1e-5)
-}
-
 /// The places of a mesh's corners, from which follows what side its faces show.
 struct Places<'a> {
     mesh: &'a Mesh,
-    rows: Rows,
+    projector: Projector,
     /// Volumes that rounding may take for 0.
     rounded: f64,
 }
@@ -225,7 +227,7 @@ impl Places<'_> {
 
     #[inline(always)]
     fn volume(&self, corners: [u32; 3]) -> f64 {
-        let at = |v: u32| self.rows.place(self.mesh.positions[v as usize]);
+        let at = |v: u32| self.projector.place(self.mesh.positions[v as usize]);
         let (a, b, c) = (at(corners[0]), at(corners[1]), at(corners[2]));
         let (x, y, w) = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]);
         (x * c[0] + y * c[1]) + w * c[2]

@@ -30,7 +30,7 @@ fn edges_that_are_surely_inside_have_no_outline() {
     let limits = Limits::default();
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
     let bundle = Bundle::of_one(open_surface(60).into_bytes());
-    let mesh = import(&bundle, None, &limits, &mut budget, &deadline).unwrap().mesh;
+    let mesh = import(&bundle, None, &limits, &mut budget, &deadline).unwrap().0;
     for cull in ["none", "back"] {
         let keys = [("style", "outline"), ("outline.method", "hull"), ("materials.red.surface.cull", cull)];
         let keys: Vec<(String, String)> = keys.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
@@ -86,7 +86,7 @@ fn runs_tell_what_their_faces_would() {
         (0.02, "iso", "perspective"),
     ] {
         let bundle = Bundle::of_one(ball(90, height).into_bytes());
-        let mesh = import(&bundle, None, &limits, &mut budget, &deadline).unwrap().mesh;
+        let mesh = import(&bundle, None, &limits, &mut budget, &deadline).unwrap().0;
         let keys = [("style", "outline"), ("view", view), ("camera.projection", projection)];
         let keys: Vec<(String, String)> = keys.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
         let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
@@ -94,7 +94,7 @@ fn runs_tell_what_their_faces_would() {
         let scene = Scene::new(&mesh, &spec, &mut budget).unwrap();
         let mut cx = PlanContext::new(&mut budget, &deadline, &[]);
         let view = ScreenMesh::new(&scene, &mut cx).unwrap();
-        let places = Places { mesh: &mesh, rows: view.rows, rounded: 0.0 };
+        let places = Places { mesh: &mesh, projector: view.projector, rounded: 0.0 };
         for (r, run) in view.runs.runs.iter().enumerate() {
             let side = view.run_view.side(run);
             (sure, all) = (sure + usize::from(side != 0), all + 1);

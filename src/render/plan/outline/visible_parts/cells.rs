@@ -1,6 +1,6 @@
 //! The cells of a grid over the picture, and marks of some of them.
 
-use crate::plan::outline::screen_edges::PX;
+use crate::plan::PX;
 
 /// The fewest and the most cells.
 const CELLS: [f64; 2] = [256.0, 1_048_576.0];

@@ -60,7 +60,7 @@ impl FaceGrid {
         let mesh = view.view.mesh;
         let runs = near_runs(view, marks, cx)?;
         let near = near_faces(view, marks, hides, &runs, cx)?;
-        let faces: Vec<ScreenFace> = select_by("faces near an outline", [runs.len(), RUNS], cx, |range, found| {
+        let faces: Vec<ScreenFace> = select_by("faces near an outline", runs.len(), RUNS, cx, |range, found| {
             for (&run, &near) in runs[range.clone()].iter().zip(&near[range]) {
                 let mut rest = near;
                 while rest != 0 {
@@ -125,7 +125,7 @@ fn near_faces(
     runs: &[u32],
     cx: &mut PlanContext<'_>,
 ) -> Result<Vec<u32>, PlanError> {
-    let (mesh, near) = (view.view.mesh, view.near());
+    let (mesh, near_w) = (view.view.mesh, view.view.near_w());
     let is_near = |face: usize| {
         let hides = hides.get(mesh.triangle_materials[face] as usize).copied().unwrap_or(true);
         if !hides || matches!(view.view.shown(face as u32), None | Some(0)) {
@@ -133,7 +133,7 @@ fn near_faces(
         }
         let [a, b, c] = mesh.triangles[face];
         let [a, b, c] = [view.view.place(a), view.view.place(b), view.view.place(c)];
-        let is_cut = (a[2] < near) | (b[2] < near) | (c[2] < near);
+        let is_cut = (a[2] < near_w) | (b[2] < near_w) | (c[2] < near_w);
         is_cut || marks.meet(&[[a[0] / a[2], a[1] / a[2]], [b[0] / b[2], b[1] / b[2]], [c[0] / c[2], c[1] / c[2]]])
     };
     let bits = |&run: &u32| {
@@ -215,7 +215,7 @@ fn flat(face: &ScreenFace) -> [[f64; 2]; 3] {
 #[inline]
 fn screen_faces(view: &OutlineView<'_>, face: usize, each: &mut dyn FnMut(ScreenFace)) {
     let vertices = view.view.mesh.triangles[face];
-    let near = view.near();
+    let near_w = view.view.near_w();
     let mut face = |corners: [ScreenPoint; 3]| {
         let [[ax, ay, az, _], [bx, by, bz, _], [cx, cy, cz, _]] = corners;
         let (a, mut b, mut c) = ([ax, ay, az], [bx, by, bz], [cx, cy, cz]);
@@ -228,20 +228,20 @@ fn screen_faces(view: &OutlineView<'_>, face: usize, each: &mut dyn FnMut(Screen
         }
     };
     let corners = [view.homogeneous(vertices[0]), view.homogeneous(vertices[1]), view.homogeneous(vertices[2])];
-    if corners.iter().all(|corner| corner[3] >= near) {
+    if corners.iter().all(|corner| corner[3] >= near_w) {
         return face([on_screen(corners[0]), on_screen(corners[1]), on_screen(corners[2])]);
     }
     let mut cut = [[0.0; 4]; 4];
     let mut count = 0;
     for k in 0..3 {
         let (from, to) = (&corners[k], &corners[(k + 1) % 3]);
-        if from[3] >= near {
+        if from[3] >= near_w {
             cut[count] = on_screen(*from);
             count += 1;
         }
-        if (from[3] >= near) != (to[3] >= near) {
-            let (inside, outside) = if from[3] >= near { (from, to) } else { (to, from) };
-            cut[count] = on_screen(before(near, inside, outside));
+        if (from[3] >= near_w) != (to[3] >= near_w) {
+            let (inside, outside) = if from[3] >= near_w { (from, to) } else { (to, from) };
+            cut[count] = on_screen(before(near_w, inside, outside));
             count += 1;
         }
     }

@@ -7,17 +7,19 @@ mod cells;
 mod grid;
 mod hidden;
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use self::cells::{Cells, Marks};
 use self::grid::FaceGrid;
 use self::hidden::{depth_at, hidden_range};
-use crate::limits::Stopped;
-use crate::plan::PlanError;
+use crate::limits::{Deadline, Stopped};
 use crate::plan::context::{CHECK_EVERY, PlanContext};
 use crate::plan::outline::outer_side::OuterSide;
-use crate::plan::outline::screen_edges::{OutlineView, PX, ScreenEdge};
+use crate::plan::outline::screen_edges::{OutlineView, ScreenEdge};
 use crate::plan::outline::silhouette_edges::SilhouetteEdge;
+use crate::plan::{PX, PlanError};
 use crate::scene::{Fill, MaterialGroups, barycentric_wire};
 use crate::spec::{Layers, OutlineMethod};
 
@@ -87,7 +89,7 @@ pub fn visible_parts(
     let cells = Cells::new(view.half, view.view.mesh.triangles.len());
     cx.budget.spend("faces near an outline", Marks::bytes(&cells), 1)?;
     let mut marks = Marks::new(cells);
-    let mut search = Search { view, edges, places, method, grid: None };
+    let mut search = Search { view, edges, places, method, deadline: cx.deadline, grid: None };
     for (i, place) in places.iter().enumerate() {
         if i % (CHECK_EVERY >> 6) == 0 {
             cx.deadline.check()?;
@@ -102,7 +104,7 @@ pub fn visible_parts(
     let mut all = Vec::new();
     for wave in (0..edges.len()).step_by(CHUNK * WAVE) {
         let last = edges.len().min(wave + CHUNK * WAVE);
-        let chunk = |first: usize| search.parts(first..last.min(first + CHUNK), cx.deadline);
+        let chunk = |first: usize| search.parts(first..last.min(first + CHUNK));
         let starts: Vec<usize> = (wave..last).step_by(CHUNK).collect();
         let found: Vec<Vec<VisiblePart>> = if starts.len() == 1 {
             starts.into_iter().map(chunk).collect::<Result<_, Stopped>>()?
@@ -130,7 +132,7 @@ fn pairs(grid: &FaceGrid, places: &[ScreenEdge]) -> usize {
 
 /// The number of places beside an edge where it is looked at what its outline covers.
 fn samples(place: &ScreenEdge) -> usize {
-    (place.way().1 / SAMPLED).ceil().clamp(1.0, SAMPLES_MAX) as usize
+    (place.way().length / SAMPLED).ceil().clamp(1.0, SAMPLES_MAX) as usize
 }
 
 /// The edges of one search.
@@ -139,18 +141,15 @@ struct Search<'a> {
     edges: &'a [SilhouetteEdge],
     places: &'a [ScreenEdge],
     method: OutlineMethod,
+    deadline: &'a Deadline,
     /// None where there are too many faces to be looked at.
     grid: Option<FaceGrid>,
 }
 
 impl Search<'_> {
     /// The visible parts of a range of edges.
-    fn parts(
-        &self,
-        range: std::ops::Range<usize>,
-        deadline: &crate::limits::Deadline,
-    ) -> Result<Vec<VisiblePart>, Stopped> {
-        deadline.check()?;
+    fn parts(&self, range: Range<usize>) -> Result<Vec<VisiblePart>, Stopped> {
+        self.deadline.check()?;
         let mut found = Vec::with_capacity(range.len());
         let mut hidden = Vec::new();
         for i in range.filter(|&i| self.places[i].may_show) {
@@ -162,7 +161,7 @@ impl Search<'_> {
             if self.hidden(grid, i, &mut hidden) {
                 continue;
             }
-            let length = self.places[i].way().1;
+            let length = self.places[i].way().length;
             each_gap(&mut hidden, length, |range| found.push(self.part(grid, i, range)));
         }
         Ok(found)
@@ -225,7 +224,7 @@ impl Search<'_> {
     fn beside(&self, i: usize, k: usize) -> [[f64; 2]; 3] {
         let (edge, place) = (&self.edges[i], &self.places[i]);
         let at = place.at((k as f64 + 0.5) / samples(place) as f64);
-        let ([right, down], _) = place.way();
+        let [right, down] = place.way().along;
         let out = f64::from(edge.free);
         let reach = self.view.reach(edge.material, at[3]);
         let [near, far] = match self.method {

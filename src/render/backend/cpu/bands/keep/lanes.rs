@@ -4,8 +4,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x4, i32x8, mask32x8};
 
 use super::{Bounds, Kept, Sides, TrianglePass, area_of};
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::{BoxedFace, KeptFaces};
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::setups::{CornerLanes, Extents, transposed_half};
 use crate::backend::cpu::geometry::transform::OUTSIDE;
 use crate::backend::cpu::isa::LANES;

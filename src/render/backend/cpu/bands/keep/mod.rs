@@ -6,8 +6,8 @@ mod lanes;
 use std::borrow::Cow;
 use std::ops::Range;
 
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::KeptFaces;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleGrid;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::isa::{LANES, with_simd};

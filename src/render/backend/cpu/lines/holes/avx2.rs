@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::isa::LANES;
 
 /// Columns, and rows, of the corners of triangles.

@@ -13,7 +13,7 @@
 
 use super::inset::{Inset, Insets};
 use super::{Holes, half_width};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::setups::Corners;

@@ -35,7 +35,7 @@ pub(crate) mod inset;
 pub(crate) mod tips;
 
 use self::inset::{HOLE_UNIT, Inset};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility::Setup;

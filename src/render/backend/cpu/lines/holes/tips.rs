@@ -7,7 +7,7 @@
 //! around a tip get the strokes of all edges.
 
 use super::{Holes, MARKED, STROKED, looked_at};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility::Setup;

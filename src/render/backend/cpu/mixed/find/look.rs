@@ -4,7 +4,7 @@
 //! Looks are only compared with each other. They consist of numbers that are equal on both
 //! back-ends to the bit. Shaded colours would not do, because their last bits may differ.
 
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::NOTHING;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility::area;

@@ -25,7 +25,7 @@ use self::look::Step;
 use self::pairs::Pairs;
 use self::thin::{mark_thin, may_mark};
 use super::band_triangles::BandTriangles;
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::isa::dispatch;
@@ -145,7 +145,7 @@ fn find_kernel(
     for list in triangles.thin() {
         for face in list.iter() {
             let mut looked_at = 0;
-            if context.is_plain || may_mark(band, face, marks) {
+            if context.is_plain() || may_mark(band, face, marks) {
                 looked_at = mark_thin(context, band, &triangles.get(face.id), &mut pairs, marks);
             }
             // A picture whose deadline has passed is thrown away.
@@ -199,7 +199,7 @@ fn find_breaks(
         let at = band.has(0, y).then(|| band.index(0, y, 0))?;
         Some(band.ids[at..at + band.size_px[0] as usize * band.samples as usize].as_chunks().0)
     };
-    let (Some(own), Some(above), 4, false) = (row(y), row(y - 1), band.samples, context.is_plain) else {
+    let (Some(own), Some(above), 4, false) = (row(y), row(y - 1), band.samples, context.is_plain()) else {
         for (x, out) in (-1..).zip(out) {
             *out = breaks_at(context, band, [x, y], pairs);
         }

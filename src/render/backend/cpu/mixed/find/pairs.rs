@@ -2,7 +2,7 @@
 
 use super::coarse::CoarseLooks;
 use super::look::{Look, Step, step_of_linked};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::NOTHING;
 
 /// Pairs that are remembered.
@@ -68,7 +68,7 @@ impl<'a> Pairs<'a> {
     /// Remembers the look of an id, unless shortcuts are not taken.
     #[inline(always)]
     pub fn remember(&mut self, context: &RasterContext<'_>, id: u32) {
-        if id != NOTHING && !context.is_plain && !self.coarse.has(id) {
+        if id != NOTHING && !context.is_plain() && !self.coarse.has(id) {
             let look = self.look(context, id);
             self.coarse.put(id, &look);
         }

@@ -7,8 +7,8 @@
 
 use super::breaks;
 use super::pairs::Pairs;
-use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::{BoxedFace, unpair};
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::mixed::band_triangles::ScreenTriangle;

@@ -8,7 +8,7 @@ use std::arch::x86_64::*;
 use bytemuck::must_cast;
 
 use super::{HOLE_UNIT, Inset, Insets, LEVEL_PX, NARROW_PX};
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::isa::LANES;
 use crate::backend::cpu::lines::holes::avx2::{load_corners, recip};
 

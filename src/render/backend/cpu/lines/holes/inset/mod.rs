@@ -8,7 +8,7 @@
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 
-use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::setups::Corners;
 use crate::backend::cpu::geometry::transform::{recip, rsqrt};
 use crate::backend::cpu::isa::{Isa, LANES};

@@ -1,5 +1,5 @@
-//! Walls that stand on a floor of one sheet: their feet lie in its plane, are visible from above, and are
-//! hidden from below.
+//! Lines of walls that stand on a floor without thickness: their feet lie in its plane, are visible from above,
+//! and are hidden from below.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use meshsnap_render::image::Image;
 use meshsnap_render::limits::Deadline;
 use meshsnap_render::spec::Spec;
 
-use crate::support::gpus::gpus;
+use crate::support::gpus::gpus_of_case;
 use crate::support::likeness::{Likeness, Tolerance};
 use crate::support::scenes;
 
@@ -22,7 +22,7 @@ enum Standing {
     Walls,
     /// A box with a bottom, which lies in the floor's plane and may be seen as well as the floor.
     Box,
-    /// Walls above and below, and a sheet between them: their edges have three faces.
+    /// Walls above and below, and the floor between them: their edges have three faces.
     Through,
     /// The same, those below first.
     ThroughTurnedOver,
@@ -80,12 +80,12 @@ impl Floor {
     }
 }
 
-/// A picture on the CPU, and on each GPU with the same result.
-fn draw(obj: &str, spec: &Spec) -> Image {
+/// A picture on the CPU, and on the GPUs of a case with the same result.
+fn draw(obj: &str, spec: &Spec, case: usize) -> Image {
     let mesh = scenes::mesh(obj);
     let plan = scenes::plan(&mesh, spec);
     let cpu = CpuRenderer::new(1).draw(&plan, &Deadline::default()).unwrap();
-    for gpu in gpus().into_iter().flatten() {
+    for gpu in gpus_of_case(case) {
         let gpu = GpuRenderer::new(gpu.clone()).draw(&plan, &Deadline::default()).unwrap();
         Likeness::of(&cpu, &gpu).assert(Tolerance::TWINS, "a sheet");
     }
@@ -147,7 +147,7 @@ fn feet_are_hidden_by_the_sheet_that_they_stand_on() {
                 ("perspective", [1.7, 0.6, 1.8]),
             ] {
                 let [above, below] = [y, -y].map(|y| spec(keys, floor, [x, y, z], projection));
-                let with = |standing, spec| draw(&floor.obj(standing), spec);
+                let with = |standing, spec| draw(&floor.obj(standing), spec, cases);
                 let differing = |spec, a, b| differing(&with(a, spec), &with(b, spec));
                 let name = format!("{keys:?} {floor:?} {projection} {x},{y},{z}");
                 let walls = differing(&below, Standing::Nothing, Standing::Walls);
@@ -168,9 +168,9 @@ fn feet_are_hidden_by_the_sheet_that_they_stand_on() {
 #[test]
 fn the_order_of_faces_does_not_hide_a_foot() {
     let mut cases = 0;
-    for keys in LOOKS {
+    for (number, keys) in LOOKS.iter().enumerate() {
         let spec = spec(keys, FLOORS[1], [1.3, -3.0, -5.0], "perspective");
-        let draw = |standing| draw(&FLOORS[1].obj(standing), &spec);
+        let draw = |standing| draw(&FLOORS[1].obj(standing), &spec, number);
         let (one, other) = (draw(Standing::Through), draw(Standing::ThroughTurnedOver));
         assert_eq!(differing(&one, &other), 0, "{keys:?}");
         let without = differing(&one, &draw(Standing::Walls));
@@ -191,7 +191,7 @@ fn what_is_painted_on_a_sheet_is_seen_from_both_sides() {
     let mut cases = 0;
     for eye in [[2.0, 3.0, 4.0], [2.0, -3.0, 4.0]] {
         let spec = spec(&keys, floor, eye, "perspective");
-        let seen = differing(&draw(&painted, &spec), &draw(&obj, &spec));
+        let seen = differing(&draw(&painted, &spec, cases), &draw(&obj, &spec, cases));
         assert!(seen > 80, "{eye:?}: {seen} pixels show the line and the point");
         cases += 1;
     }

@@ -1,125 +1,64 @@
-//! Files that were read to be judged or compared, and the pictures of what was found.
+//! Pictures of meshes that were judged or compared, and of what was found.
 
-use crate::check::{self, Check, Place, RuleSet};
+use crate::check::Place;
 use crate::diff::{self, Compared};
 use meshsnap_render::backend::Backends;
 use meshsnap_render::caption::{Mark, Scale, draw_legend, draw_marks};
 use meshsnap_render::encode;
 use meshsnap_render::image::{Image, ImageFormat};
-use meshsnap_render::import::{self, Bundle, Imported, MeshError};
-use meshsnap_render::limits::{Budget, Deadline, LimitExceeded, Limits};
+use meshsnap_render::import::MeshError;
+use meshsnap_render::limits::{Budget, Deadline, LimitExceeded};
 use meshsnap_render::mesh::Mesh;
 use meshsnap_render::pipeline::{
-    Context, Drawn, Output, PlanError, RenderError, Stage, Staged, View, draw_cells, draw_view, with_scene,
+    Context, Drawn, Model, Output, PlanError, RenderError, Stage, Staged, View, draw_cells, draw_view, with_scene,
 };
-use meshsnap_render::plan::{self, Prepared};
+use meshsnap_render::plan::{self, PX, Prepared, Projection, Projector};
 use meshsnap_render::scene::Scene;
 use meshsnap_render::sheet::{self, Cell, Layout};
 use meshsnap_render::spec::{CameraSpec, DebugView, Sheet, SheetViews, Spec};
 
-/// A file that was read, to be judged or compared.
-pub struct Opened {
-    imported: Imported,
-    prepared: Prepared,
-    budget: Budget,
-    file_bytes: u64,
-}
-
-/// Reads a file, to judge it or to compare it. What is worked out of it later comes from the rest of `budget`.
-pub fn open(
-    bundle: &Bundle,
-    options: impl Into<import::Options>,
-    limits: &Limits,
-    mut budget: Budget,
+/// Draws a mesh. If it is to be compared, the camera is fitted to what is `beside` it, too.
+pub fn draw(
+    model: &Model,
+    beside: Option<&Model>,
+    spec: &Spec,
+    backends: &mut Backends,
     deadline: &Deadline,
-) -> Result<Opened, MeshError> {
-    let options = import::Options { counts_loose: true, ..options.into() };
-    let imported = import::import(bundle, options, limits, &mut budget, deadline)?;
-    Ok(Opened { imported, prepared: Prepared::default(), budget, file_bytes: bundle.bytes_len() })
+) -> Result<Image, RenderError> {
+    let mut budget = model.budget_beside(beside)?;
+    let framing = framing_with(model, beside, &mut budget)?;
+    let mut cx = Context { backends, budget, deadline, ended: &mut |_| () };
+    Ok(draw_view(View { framing: framing.as_deref(), ..model.view() }, spec, None, &mut cx)?.image)
 }
 
-impl Opened {
-    /// The path of the mesh in its bundle.
-    pub fn path(&self) -> &str {
-        &self.imported.path
-    }
+/// A request whose camera takes this mesh's word for what is up.
+pub fn with_up(model: &Model, spec: &Spec) -> Spec {
+    let up = Some(spec.camera.up.unwrap_or(model.mesh().up));
+    Spec { camera: CameraSpec { up, ..spec.camera }, ..spec.clone() }
+}
 
-    /// Judges the file by rules. Fails where the time of the job ends, and by its memory unless rules are to tell that.
-    pub fn check(
-        &self,
-        rules: &RuleSet,
-        options: check::Options,
-        deadline: &Deadline,
-    ) -> Result<Vec<Check>, MeshError> {
-        let Imported { mesh, report, .. } = &self.imported;
-        let subject = check::Subject { mesh, import: report, file_bytes: self.file_bytes };
-        check::check(&subject, rules, options, &mut self.budget.clone(), deadline)
-    }
+/// Marks places of faults in a picture of a mesh, drawn with the same mesh beside it. Those that are hidden are marked,
+/// too.
+pub fn mark(
+    image: &mut Image,
+    model: &Model,
+    beside: Option<&Model>,
+    spec: &Spec,
+    places: &[Place],
+    deadline: &Deadline,
+) -> Result<(), RenderError> {
+    let mut budget = model.budget_beside(beside)?;
+    let framing = framing_with(model, beside, &mut budget)?;
+    mark_in(image, View { framing: framing.as_deref(), ..model.view() }, spec, places, &mut budget, deadline)
+}
 
-    /// Compares the file with another, which is the newer one. `max_distance` is the largest distance between the
-    /// surfaces that counts as the same; None: what encodings round away.
-    pub fn diff(&self, other: &Self, max_distance: Option<f64>, deadline: &Deadline) -> Result<Compared, MeshError> {
-        let mut budget = self.budget_beside(other)?;
-        let [a, b] = [&self.imported, &other.imported]
-            .map(|Imported { mesh, report, .. }| diff::ComparedFile { mesh, import: report });
-        diff::compare(a, b, max_distance, &mut budget, deadline)
-    }
-
-    /// Draws the file. If it is to be compared, the camera is fitted to what is `beside` it, too.
-    pub fn draw(
-        &self,
-        beside: Option<&Self>,
-        spec: &Spec,
-        backends: &mut Backends,
-        deadline: &Deadline,
-    ) -> Result<Image, RenderError> {
-        let mut budget = self.budget_of(beside)?;
-        let framing = self.framing_with(beside, &mut budget)?;
-        let mut cx = Context { backends, budget, deadline, ended: &mut |_| () };
-        Ok(draw_view(self.view(framing.as_deref()), spec, None, &mut cx)?.image)
-    }
-
-    /// A request whose camera takes this file's word for what is up.
-    pub fn with_up(&self, spec: &Spec) -> Spec {
-        let up = Some(spec.camera.up.unwrap_or(self.imported.mesh.up));
-        Spec { camera: CameraSpec { up, ..spec.camera }, ..spec.clone() }
-    }
-
-    /// Marks places of faults in a picture of the file, drawn with the same file beside it. Those that are hidden are
-    /// marked, too.
-    pub fn mark(
-        &self,
-        image: &mut Image,
-        beside: Option<&Self>,
-        spec: &Spec,
-        places: &[Place],
-        deadline: &Deadline,
-    ) -> Result<(), RenderError> {
-        let mut budget = self.budget_of(beside)?;
-        let framing = self.framing_with(beside, &mut budget)?;
-        mark_in(image, self.view(framing.as_deref()), spec, places, &mut budget, deadline)
-    }
-
-    fn view<'a>(&'a self, framing: Option<&'a [[f32; 3]]>) -> View<'a> {
-        View { mesh: &self.imported.mesh, prepared: &self.prepared, framing }
-    }
-
-    /// The places to which a camera is fitted that shows this file and another. None: there is no other.
-    fn framing_with(&self, beside: Option<&Self>, budget: &mut Budget) -> Result<Option<Vec<[f32; 3]>>, MeshError> {
-        Ok(beside.map(|other| diff::framing(&self.imported.mesh, &other.imported.mesh, budget)).transpose()?)
-    }
-
-    /// The memory that is left beside the file, and beside another if there is one.
-    fn budget_of(&self, beside: Option<&Self>) -> Result<Budget, MeshError> {
-        beside.map_or_else(|| Ok(self.budget.clone()), |other| self.budget_beside(other))
-    }
-
-    /// The memory that is left beside both files.
-    fn budget_beside(&self, other: &Self) -> Result<Budget, MeshError> {
-        let mut budget = self.budget.clone();
-        budget.spend("the other mesh", other.budget.spent_bytes(), 1)?;
-        Ok(budget)
-    }
+/// The places to which a camera is fitted that shows this mesh and another. None: there is no other.
+fn framing_with(
+    model: &Model,
+    beside: Option<&Model>,
+    budget: &mut Budget,
+) -> Result<Option<Vec<[f32; 3]>>, MeshError> {
+    Ok(beside.map(|other| diff::framing(model.mesh(), other.mesh(), budget)).transpose()?)
 }
 
 /// Marks places in a picture of a view.
@@ -143,22 +82,22 @@ fn mark_in(
 
 /// Marks places in a picture of a scene.
 fn mark_places(image: &mut Image, scene: &Scene<'_, '_>, places: &[Place]) {
-    let rows = scene.camera.rows([image.width_px, image.height_px]);
+    let projector = Projector::new(&Projection::new(&scene.camera, [image.width_px, image.height_px]));
     let middle = [f64::from(image.width_px) / 2.0, f64::from(image.height_px) / 2.0];
-    let near = scene.camera.near;
+    // A fault that is too near to be drawn is marked all the same, if it lies before the eye.
+    let near_w = scene.camera.near.min(1e-3);
     let on_image = |position: &[f64; 3]| -> Option<[f64; 2]> {
         let to_file = &scene.mesh.to_file;
         let at: [f64; 3] = std::array::from_fn(|k| (position[k] - to_file.centre[k]) / to_file.scale);
-        let [x, y, _, w] = rows.map(|row| (0..3).map(|k| f64::from(row[k]) * at[k]).sum::<f64>() + f64::from(row[3]));
-        // Beyond the eye nothing is seen.
-        (w > near.min(1e-3) && w.is_finite()).then(|| [middle[0] + x / (256.0 * w), middle[1] + y / (256.0 * w)])
+        let [x, y, _] = projector.on_screen(at, near_w)?;
+        (x.is_finite() && y.is_finite()).then(|| [middle[0] + x / PX, middle[1] + y / PX])
     };
-    let marks: Vec<Mark> = places.iter().filter_map(|place| mark(place, on_image)).flatten().collect();
+    let marks: Vec<Mark> = places.iter().filter_map(|place| marks_of(place, on_image)).flatten().collect();
     draw_marks(image, &marks);
 }
 
 /// The marks of a place. None if a part of it is beyond the eye.
-fn mark(place: &Place, on_image: impl Fn(&[f64; 3]) -> Option<[f64; 2]>) -> Option<Vec<Mark>> {
+fn marks_of(place: &Place, on_image: impl Fn(&[f64; 3]) -> Option<[f64; 2]>) -> Option<Vec<Mark>> {
     Some(match place {
         Place::Vertex(at) => vec![Mark::Dot(on_image(at)?)],
         Place::Edge([a, b]) => vec![Mark::Line([on_image(a)?, on_image(b)?])],
@@ -201,7 +140,7 @@ impl Side {
 /// Draws pictures of two meshes that were compared beside each other, all through one camera that is fitted to both.
 /// `spec` is the request of the pictures in colours of distances, `plain` that of the others, and says its size.
 pub fn draw_difference(
-    opened: [&Opened; 2],
+    models: [&Model; 2],
     compared: &Compared,
     sides: &[Side],
     spec: &Spec,
@@ -209,12 +148,12 @@ pub fn draw_difference(
     backends: &mut Backends,
     deadline: &Deadline,
 ) -> Result<Drawn, RenderError> {
-    let budget = opened[0].budget_beside(opened[1])?;
-    let meshes = opened.map(|opened| &opened.imported.mesh);
+    let budget = models[0].budget_beside(Some(models[1]))?;
+    let meshes = models.map(Model::mesh);
     let all = compared.of_vertices.iter().flatten();
     let most = all.copied().filter(|distance| distance.is_finite()).fold(0.0, f64::max);
     // The newer mesh says what is up, so that the camera is one.
-    let spec = opened[1].with_up(spec);
+    let spec = with_up(models[1], spec);
     let camera = CameraSpec { up: spec.camera.up, ..plain.camera };
     let plain = Spec { image: spec.image, camera, ..plain.clone() };
     let views = SheetViews::Named(vec![spec.camera.view; sides.len()]);
@@ -223,11 +162,11 @@ pub fn draw_difference(
         let limit = |error| RenderError::from(PlanError::Limit(error));
         // A picture of one pixel has no room for several sides.
         let Some((cell, side)) = cell.and_then(|cell| Some((cell, sides[cell.view? as usize]))) else {
-            return draw_view(opened[1].view(None), &plain, None, cx);
+            return draw_view(models[1].view(), &plain, None, cx);
         };
         let index = side.index();
         let framing = diff::framing(meshes[index], meshes[1 - index], &mut cx.budget).map_err(limit)?;
-        let view = opened[index].view(Some(&framing));
+        let view = View { framing: Some(&framing), ..models[index].view() };
         if !side.has_colors() {
             return draw_view(view, &sheet::cell_spec(&plain, &sheet, cell), None, cx);
         }
@@ -262,7 +201,7 @@ fn heat(mesh: &Mesh, compared: &Compared, side: usize, most: f64, budget: &mut B
 
 /// Both sides in the colours of their distance, as the bytes of a picture.
 pub fn render_difference(
-    opened: [&Opened; 2],
+    models: [&Model; 2],
     compared: &Compared,
     spec: &Spec,
     backends: &mut Backends,
@@ -270,7 +209,7 @@ pub fn render_difference(
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Output, RenderError> {
     let sides = [Side::HeatBefore, Side::HeatAfter];
-    let drawn = draw_difference(opened, compared, &sides, spec, spec, backends, deadline)?;
+    let drawn = draw_difference(models, compared, &sides, spec, spec, backends, deadline)?;
     ended(Stage::Render);
     let format = spec.image.format.unwrap_or(ImageFormat::Png);
     let bytes = encode::encode(&drawn.image, format, spec.image.effort, deadline)?;
