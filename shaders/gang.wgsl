@@ -3,8 +3,8 @@
 //
 // Uses: common.wgsl (Batch, Frame, JOBS_MAX).
 
-@group(0) @binding(0) var<storage, read> frames: array<Frame, JOBS_MAX>;
-@group(0) @binding(1) var<storage, read> batches: array<Batch, JOBS_MAX>;
+@group(0) @binding(0) var<uniform> frames: array<Frame, JOBS_MAX>;
+@group(0) @binding(1) var<uniform> batches: array<Batch, JOBS_MAX>;
 
 // Those of the job.
 var<private> frame: Frame;

@@ -2,8 +2,8 @@
 //
 // Uses: common.wgsl (Batch, Frame).
 
-@group(0) @binding(0) var<storage, read> frame: Frame;
-@group(0) @binding(1) var<storage, read> batch: Batch;
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> batch: Batch;
 
 // To be called first, with the third coordinate of the workgroup.
 fn begin_job(number: u32) {

@@ -184,7 +184,7 @@ impl Buffers {
             gpu.queue.write_buffer(buffer, 0, bytes);
             return Ok(buffer.clone());
         }
-        let usage = U::STORAGE | U::MAP_WRITE;
+        let usage = U::UNIFORM | U::STORAGE | U::MAP_WRITE;
         let descriptor = wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: true };
         let buffer = gpu.device.create_buffer(&descriptor);
         let mut view = buffer.get_mapped_range_mut(..).map_err(|e| DrawError::Device(e.to_string()))?;
@@ -197,7 +197,7 @@ impl Buffers {
     /// A uniform buffer of at least `size` bytes.
     pub fn uniform<'a>(gpu: &Handles, slot: &'a mut Option<wgpu::Buffer>, size: u64) -> &'a wgpu::Buffer {
         use wgpu::BufferUsages as U;
-        grow(gpu, slot, size, gpu.limits.max_buffer_size, U::STORAGE | U::COPY_DST)
+        grow(gpu, slot, size, gpu.limits.max_buffer_size, U::UNIFORM | U::STORAGE | U::COPY_DST)
     }
 
     /// A buffer of at least `size` bytes that the CPU can map, and kernels write to if the device allows both.

@@ -76,7 +76,7 @@ const ALONE_SIZE_OF_FEW: i32 = 1024;
 /// The reason once the device is lost.
 type Lost = Arc<OnceLock<String>>;
 
-/// Storage buffers that a kernel binds, at most.
+/// Storage buffers that a kernel binds, at most; two of them hold a software device's uniforms.
 const STORAGE_BUFFERS: u32 = 19;
 
 /// Polls without a pause: a small picture takes a fraction of a millisecond.
@@ -133,11 +133,16 @@ impl Gpu {
         tracing::debug!(name = info.name, "opened a device");
         let features = if int64_atomics { vec!["int64-atomics"] } else { vec![] };
         let is_software = info.device_type == wgpu::DeviceType::Cpu;
+        let uniforms = if is_software {
+            wgpu::BufferBindingType::Storage { read_only: true }
+        } else {
+            wgpu::BufferBindingType::Uniform
+        };
         let is_discrete = info.device_type == wgpu::DeviceType::DiscreteGpu;
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
         let info = GpuInfo { name: info.name, driver, device_type: type_name(info.device_type), features };
         Ok(Self {
-            handles: Handles { device, queue, limits, maps_storage, readbacks: Arc::default() },
+            handles: Handles { device, queue, limits, maps_storage, uniforms, readbacks: Arc::default() },
             pipelines: Pipelines::kept_in(file),
             spare_buffers: SpareBuffers::new(if is_discrete { SPARE_BYTES_DISCRETE } else { SPARE_BYTES }),
             residents: ResidentBuffers::new(if is_software { RESIDENT_BYTES_SOFTWARE } else { RESIDENT_BYTES }),
@@ -254,7 +259,7 @@ impl Gpu {
         let make = || {
             self.scoped(|| {
                 while let Some(&kernel) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    self.pipelines.get(&self.handles.device, kernel, key);
+                    self.pipelines.get(&self.handles, kernel, key);
                 }
                 Ok(())
             })

@@ -11,6 +11,9 @@ pub struct Handles {
     pub limits: wgpu::Limits,
     /// True if kernels can write to a buffer that the CPU reads, and read one that it writes.
     pub maps_storage: bool,
+    /// The kind of buffer that holds uniforms: storage on a software device. llvmpipe puts the values of uniform buffers
+    /// into kernels and compiles them anew for other values.
+    pub uniforms: wgpu::BufferBindingType,
     /// Buffers for the next pictures.
     pub readbacks: Arc<ReadbackPool>,
 }

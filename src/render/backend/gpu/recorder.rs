@@ -49,7 +49,7 @@ impl<'a> Recorder<'a> {
         let batches = upload_batches(&gpu.handles, buffers, batches);
         let uniforms = match buffers.uniforms.take() {
             Some((frame_before, batches_before, group)) if frame_before == frame && batches_before == batches => group,
-            _ => bind_uniforms(&gpu.handles.device, &frame, (&batches, BATCH_STRIDE)),
+            _ => bind_uniforms(&gpu.handles, &frame, (&batches, BATCH_STRIDE)),
         };
         buffers.uniforms = Some((frame, batches, uniforms.clone()));
         Ok(Self {
@@ -242,7 +242,7 @@ pub fn bind_buffers(
     kernel: Kernel,
     key: u32,
 ) -> Result<(Arc<Pipeline>, wgpu::BindGroup), DrawError> {
-    let pipeline = gpu.pipelines.get(&gpu.handles.device, kernel, key);
+    let pipeline = gpu.pipelines.get(&gpu.handles, kernel, key);
     let mut bound = Vec::new();
     for &slot in &pipeline.slots {
         bound.push((slot, buffers.storage(&gpu.handles, kernel.bound_at(slot))?));
@@ -261,14 +261,14 @@ pub fn bind_buffers(
 
 /// Binds the uniforms of a plan, and one dispatch's of those of all, which lie `stride` bytes apart.
 pub fn bind_uniforms(
-    device: &wgpu::Device,
+    gpu: &Handles,
     frame: &wgpu::Buffer,
     (batches, stride): (&wgpu::Buffer, usize),
 ) -> wgpu::BindGroup {
     let one = wgpu::BufferBinding { buffer: batches, offset: 0, size: wgpu::BufferSize::new(stride as u64) };
-    device.create_bind_group(&wgpu::BindGroupDescriptor {
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,
-        layout: &uniforms_layout(device),
+        layout: &uniforms_layout(gpu),
         entries: &[
             wgpu::BindGroupEntry { binding: 0, resource: frame.as_entire_binding() },
             wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(one) },

@@ -86,7 +86,7 @@ fn submit(
     let bytes: &[u8] = bytemuck::cast_slice(&batches);
     let of_dispatches = Buffers::uniform(&gpu.handles, &mut buffers.batches, bytes.len() as u64).clone();
     gpu.handles.queue.write_buffer(&of_dispatches, 0, bytes);
-    let group = bind_uniforms(&gpu.handles.device, &frames, (&of_dispatches, BATCHES_STRIDE));
+    let group = bind_uniforms(&gpu.handles, &frames, (&of_dispatches, BATCHES_STRIDE));
     let mut bound = Vec::new();
     for &kernel in &kernels {
         bound.push(bind_buffers(gpu, buffers, kernel, key)?);

@@ -16,6 +16,7 @@ use bytemuck::CheckedBitPattern;
 
 use self::file::PipelineFile;
 use self::reflection::Reflection;
+use super::handles::Handles;
 use crate::backend::DrawStage;
 
 /// A kernel, in one of its variants.
@@ -181,10 +182,10 @@ impl Pipelines {
     }
 
     /// The pipeline of a kernel for a plan with this key.
-    pub fn get(&self, device: &wgpu::Device, kernel: Kernel, key: u32) -> Arc<Pipeline> {
+    pub fn get(&self, gpu: &Handles, kernel: Kernel, key: u32) -> Arc<Pipeline> {
         let key = self.key_of(kernel, key);
         made_once(&self.made, (kernel, key), || {
-            let pipeline = Arc::new(kernel.compile(device, key, self.file.as_ref().map(PipelineFile::cache)));
+            let pipeline = Arc::new(kernel.compile(gpu, key, self.file.as_ref().map(PipelineFile::cache)));
             tracing::debug!(?kernel, key, "made a pipeline");
             pipeline
         })
@@ -225,19 +226,15 @@ fn made_once<K: Eq + Hash, T: Clone>(things: &MadeOnce<K, T>, key: K, make: impl
 }
 
 /// The layout of group 0: the plan's uniforms, and the dispatch's at a dynamic offset.
-pub fn uniforms_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+pub fn uniforms_layout(gpu: &Handles) -> wgpu::BindGroupLayout {
     let entry = |binding, has_dynamic_offset| {
         layout_entry(
             binding,
-            wgpu::BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Storage { read_only: true },
-                has_dynamic_offset,
-                min_binding_size: None,
-            },
+            wgpu::BindingType::Buffer { ty: gpu.uniforms, has_dynamic_offset, min_binding_size: None },
         )
     };
     let entries = [entry(0, false), entry(1, true)];
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("uniforms"), entries: &entries })
+    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("uniforms"), entries: &entries })
 }
 
 fn layout_entry(binding: u32, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEntry {
@@ -263,15 +260,18 @@ impl Kernel {
         }
     }
 
-    fn compile(self, device: &wgpu::Device, key: u32, cache: Option<&wgpu::PipelineCache>) -> Pipeline {
-        let label = Some(self.entry());
-        let source = self.source_for(key);
+    fn compile(self, gpu: &Handles, key: u32, cache: Option<&wgpu::PipelineCache>) -> Pipeline {
+        let (device, label) = (&gpu.device, Some(self.entry()));
+        let mut source = self.source_for(key);
+        if gpu.uniforms != wgpu::BufferBindingType::Uniform {
+            source = source.replace("var<uniform>", "var<storage, read>");
+        }
         let bound = Reflection::of(self.entry(), &source).buffers;
         let entries: Vec<_> = bound.iter().map(|&(slot, access)| buffer_entry(slot, access)).collect();
         let buffers = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label,
-            bind_group_layouts: &[Some(&uniforms_layout(device)), Some(&buffers)],
+            bind_group_layouts: &[Some(&uniforms_layout(gpu)), Some(&buffers)],
             immediate_size: 0,
         });
         let source = wgpu::ShaderSource::Wgsl(source.into());
