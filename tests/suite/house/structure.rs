@@ -120,10 +120,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("library", &[]),
     ("inspect/geometry", &[]),
     ("inspect/made_obj", &[]),
-    ("inspect/report", &["inspect/geometry"]),
+    ("inspect/report", &["inspect/geometry", "inspect/images"]),
     ("inspect/check", &["inspect/geometry", "inspect/report"]),
     ("inspect/diff", &["inspect/geometry", "inspect/report"]),
-    ("inspect/opened", &["inspect/check", "inspect/diff"]),
+    ("inspect/images", &[]),
+    ("inspect/drawing", &["inspect/check", "inspect/diff"]),
     // What commands share, then a room for each command or kind of commands.
     ("program/error", &[]),
     ("program/progress", &[]),
