@@ -112,9 +112,12 @@ impl Server {
         let status = Command::new("sh").arg("-c").arg(format!("kill -KILL {}", self.child.id())).status().unwrap();
         assert!(status.success());
         let began = Instant::now();
-        // The process is gone when its data folder is free; it stays a zombie until it is waited for.
-        while !std::fs::read_to_string(format!("/proc/{}/stat", self.child.id())).is_ok_and(|stat| stat.contains(") Z"))
-        {
+        // Its data folder is free when its last thread is gone. The process stays a zombie until it is waited for, and is
+        // one as soon as its first thread has ended.
+        let of_process = |name: &str| format!("/proc/{}/{name}", self.child.id());
+        let is_zombie = || std::fs::read_to_string(of_process("stat")).is_ok_and(|stat| stat.contains(") Z"));
+        let has_one_thread = || std::fs::read_dir(of_process("task")).is_ok_and(|threads| threads.count() == 1);
+        while !(is_zombie() && has_one_thread()) {
             assert!(began.elapsed() < PATIENCE, "the server does not die");
             std::thread::sleep(Duration::from_millis(1));
         }
