@@ -121,7 +121,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("inspect/geometry", &[]),
     ("inspect/made_obj", &[]),
     ("inspect/report", &["inspect/geometry", "inspect/images"]),
-    ("inspect/check", &["inspect/geometry", "inspect/report"]),
+    ("inspect/check", &["inspect/geometry", "inspect/images", "inspect/report"]),
     ("inspect/diff", &["inspect/geometry", "inspect/report"]),
     ("inspect/images", &[]),
     ("inspect/drawing", &["inspect/check", "inspect/diff"]),
