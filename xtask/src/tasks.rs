@@ -1,6 +1,6 @@
 //! The commands. Each says what it runs, runs it in the repository's root, and stops at the first failure.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// A failure's text, for standard error.
@@ -172,8 +172,25 @@ pub fn package(options: &[&str]) -> Result {
     let mut package = cargo(&[&["package"], &of_crates[..], options].concat());
     // They are built, and nothing of them runs.
     package.env("CARGO_PROFILE_DEV_OPT_LEVEL", "0");
+    forget_unpacked_archives();
     run(package)?;
     PUBLISHED.iter().try_for_each(|name| look_into_archive(name, options))
+}
+
+/// Removes what cargo has unpacked of earlier archives. It takes them for those of now, because their version is the same.
+fn forget_unpacked_archives() {
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| std::env::home_dir().map(|home| home.join(".cargo"))).unwrap_or_default();
+    let folders = |folder: &Path| std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    // Registries on disk have no host before the hyphen.
+    for registry in folders(&home.join("registry/src")).filter(|path| name(path).starts_with('-')) {
+        for archive in folders(&registry).filter(|path| name(path).starts_with("meshsnap")) {
+            if let Err(error) = std::fs::remove_dir_all(&archive) {
+                eprintln!("xtask: {} is out of date and cannot be removed: {error}", archive.display());
+            }
+        }
+    }
 }
 
 /// Refuses an archive that is too large, or holds what only the repository needs.
