@@ -1,4 +1,4 @@
-//! What a plan gives the device: the input of each stage, and room for its output.
+//! Uploads of a plan: the input of each stage, and room for its output.
 
 use super::buffers::Buffers;
 use super::device::Gpu;

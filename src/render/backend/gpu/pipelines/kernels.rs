@@ -1,4 +1,4 @@
-//! What a kernel is made of, and what is bound to it.
+//! The files that a kernel is made of, and the buffers that are bound to it.
 
 use super::key;
 use super::prune::pruned;

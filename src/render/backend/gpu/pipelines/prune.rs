@@ -1,14 +1,14 @@
 //! Leaves out code that a pipeline never runs, before a driver sees it.
 //!
-//! A driver also removes what a constant switches off, but most put functions in place of their calls first. Without
-//! textures that was most of its work: a texture is looked up in five places.
+//! A driver also removes what a constant switches off, but Mesa's puts functions in place of their calls first: the
+//! code that looks a texture up, five times.
 
 use std::collections::HashMap;
 
 use super::reflection::constant;
 
 /// The code without the blocks that begin with `if has(FLAG)`, or `if has(FLAG) && ...`, where the key lacks the flag. What
-/// follows `else` stays.
+/// follows `else` stays; an `else if` must not follow.
 ///
 /// In shaders/, the first and the last line of such a block hold nothing else, and begin in the same column.
 pub fn pruned(source: &str, key: u32) -> String {

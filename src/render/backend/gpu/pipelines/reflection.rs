@@ -1,4 +1,4 @@
-//! What a kernel's code uses: buffers, and bits of the pipeline key.
+//! Buffers, and bits of the pipeline key, that a kernel's code uses.
 //!
 //! Only functions that the entry point calls count, however indirectly. In shaders/, what lies outside of functions
 //! begins at the start of a line, and so do functions and their closing brackets.
