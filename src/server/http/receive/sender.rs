@@ -18,7 +18,7 @@ const DOCUMENT_BYTES_MAX: u64 = 64 << 10;
 
 /// The party that sends a request, and the names of the request.
 pub struct Sender {
-    /// What it sees.
+    /// Its access to stored things.
     pub access: Access,
     /// The name that the client gave its job.
     pub name: Option<ClaimName>,
