@@ -1,8 +1,8 @@
 // Stage transform, per vertex: unit box to snapped screen coordinates. Twin of
 // src/render/backend/cpu/geometry/transform.rs.
 //
-// It also empties the first band's visibility buffer and the first work list: a command for each would cost the
-// device more than the stores do.
+// It also empties the first band's visibility buffer and the first work list: separate commands would be slower than
+// these stores.
 //
 // Uses: common.wgsl (homogeneous, OUTSIDE, recip, rn, round_to_i32, Vertex, WORKGROUP),
 // one_job.wgsl or gang.wgsl (batch, begin_job, frame, job).

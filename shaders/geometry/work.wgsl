@@ -1,4 +1,4 @@
-// Stage visibility: the work list of large triangles, for visibility_tile.wgsl.
+// Stage visibility: the list of large triangles that visibility_tile.wgsl draws, and how others append to it.
 //
 // Uses: common.wgsl (ITEM_VECTORS, JOBS_MAX), one_job.wgsl or gang.wgsl (batch, frame, job),
 // geometry/triangle.wgsl (Setup).

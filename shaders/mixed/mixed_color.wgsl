@@ -1,4 +1,5 @@
-// Stage mixed, per mixed pixel whose points are in memory: its colour by what they see. Twin of
+// Stage mixed, per mixed pixel whose points are in memory: sums the colours of the triangles that its points see, each
+// weighed by its share of them. Twin of
 // src/render/backend/cpu/mixed/color.rs. Pixels that have lists of triangles go through mixed_parts.wgsl instead.
 //
 // Uses: common.wgsl (has, LINES, WORKGROUP), one_job.wgsl (batch), mixed/lattice.wgsl (FEW_STEP,

@@ -1,6 +1,6 @@
-// Stage mixed, per pixel that a workgroup has in hand: the points that see each of its triangles, as sets. Twin of
-// src/render/backend/cpu/mixed/points.rs. Sets make the shares of up to as many triangles as there are threads; shares.wgsl
-// looks at all points of a pixel instead, for more.
+// Stage mixed, per pixel that a workgroup works on: the points that see each of its triangles, as sets. Twin of
+// src/render/backend/cpu/mixed/points.rs. There is room for one set per thread. Pixels with more triangles use shares.wgsl,
+// which goes through all points.
 //
 // Uses: common.wgsl (recip, rn2, WORKGROUP), mixed/lattice.wgsl (FEW_STEP, point_place, POINTS,
 // Share), mixed/shares.wgsl (firsts, FIRSTS_WORDS, seen), surface/material.wgsl (is_quartered).

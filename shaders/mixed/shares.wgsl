@@ -1,4 +1,4 @@
-// Stage mixed, per pixel that a workgroup has in hand: the share of its points that each triangle has. Twin of
+// Stage mixed, per pixel that a workgroup works on: the share of its points that each triangle has. Twin of
 // src/render/backend/cpu/mixed/shares.rs.
 //
 // Uses: common.wgsl (recip, rn2, WORKGROUP), mixed/lattice.wgsl (FEW_FIRST, FEW_STEP, point_place,

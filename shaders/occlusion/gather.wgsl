@@ -1,5 +1,5 @@
-// Stage occlusion, per pixel of every second column and row: looks at places around it and adds up what light they
-// take. Twin of src/render/backend/cpu/occlusion/gather.rs.
+// Stage occlusion, per pixel of every second column and row: looks at places around it and adds up how much light
+// each blocks. Twin of src/render/backend/cpu/occlusion/gather.rs.
 //
 // Uses: common.wgsl (dot3, pixel_corner, quick_rsqrt, rn, rn2, rn3, round_to_i32, sample_offset,
 // WORKGROUP), one_job.wgsl or gang.wgsl (batch, begin_job, frame), occlusion/place.wgsl
@@ -10,7 +10,7 @@
 
 // Sine of the angle above the surface below which nothing takes light.
 const BIAS: f32 = 0.1;
-// Factor of the mean that the places take.
+// Factor of the mean that the places block.
 const GAIN: f32 = 6.0;
 // Places that a pixel looks at.
 const TAPS_PER_PIXEL: u32 = 16u;

@@ -41,8 +41,8 @@
 //! bytes -> Mesh -> Scene -> DrawPlan -> backend (gpu | cpu) -> Image -> encoded bytes
 //! ```
 //!
-//! That line is the whole program. ARCHITECTURE.md in the repository is the map of it. The command line and the HTTP service
-//! are the crate `meshsnap-cli`.
+//! That line is the whole program. ARCHITECTURE.md in the repository is the map of it. The command line is the crate
+//! `meshsnap-cli`, the HTTP service the crate `meshsnap-server`.
 
 mod error;
 mod mesh;

@@ -1,5 +1,5 @@
-//! The jobs that have ended and can still be asked for. Results stay until they are fetched and then for a
-//! while, under caps of bytes and of number.
+//! The jobs that have ended and can still be asked for. A result that nobody has fetched stays for
+//! `unfetched_ttl`, a fetched one for `result_ttl`; caps of bytes and of number end both sooner.
 
 use std::collections::{BTreeMap, HashMap};
 use std::time::{Duration, Instant};

@@ -1,5 +1,5 @@
-//! Claims of the documents that a test can check: the files that they name exist, and ARCHITECTURE.md lists every error
-//! code whose status is 429.
+//! Claims of the documents that a test can check: the files that they name exist, ARCHITECTURE.md lists every error
+//! code whose status is 429, and no document is left half merged.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -93,6 +93,18 @@ fn paths_in_documents_exist() {
     assert!(documents.len() > 40, "only {} documents found: the scan is broken", documents.len());
     assert!(checked >= PATHS_MIN, "only {checked} paths found: the scan is broken");
     assert!(missing.is_empty(), "these do not exist:\n{}", missing.join("\n"));
+}
+
+#[test]
+fn no_document_holds_both_sides_of_a_merge() {
+    let mut documents = documents();
+    documents.push("CHANGELOG.md".into());
+    let marks = ["<<<<<<< ", "||||||| ", ">>>>>>> "];
+    for document in documents {
+        let text = std::fs::read_to_string(root().join(&document)).unwrap();
+        let mark = text.lines().position(|line| marks.iter().any(|mark| line.starts_with(mark)));
+        assert!(mark.is_none(), "{}:{}: a merge was not finished", document.display(), mark.unwrap_or(0) + 1);
+    }
 }
 
 #[test]

@@ -14,7 +14,7 @@ fn found(mesh: &Mesh) -> (Vec<u32>, Option<u64>) {
     (faces, t_junctions(mesh, &budget, &deadline).unwrap())
 }
 
-/// A flat triangle, and another one with these corners.
+/// A triangle in the plane z = 0, and one with these corners, which shares vertices with it where corners are equal.
 fn with(corners: [[f32; 3]; 3]) -> Mesh {
     let flat = [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
     let mut positions = flat.to_vec();

@@ -6,8 +6,8 @@ use crate::import::sniff::foreign;
 use crate::import::{Folder, Format, MeshError, MeshFault, sniff};
 use crate::limits::Deadline;
 
-/// Finds the mesh among the unpacked files of a bundle: the one that it names as its entry, or the
-/// only one that is a mesh. `format` overrides sniffing.
+/// Finds the mesh among the unpacked files of a bundle: the one that it names as its entry, a package (such as 3MF)
+/// that all of its files make up, or the only one that is a mesh. `format` overrides sniffing.
 pub fn choose(
     files: Vec<BundleFile>,
     bundle: &Bundle,

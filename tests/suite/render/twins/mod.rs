@@ -1,4 +1,5 @@
-//! GPU against CPU, stage by stage.
+//! GPU against CPU: `visibility` compares samples, `shade` and `flat` colours, `pictures` whole pictures, `linear` those in
+//! linear light, `gangs` jobs that share dispatches; `shared_pixels` reads pictures where the GPU has written them.
 
 pub mod flat;
 mod gangs;

@@ -72,8 +72,8 @@ impl Batch {
         }
     }
 
-    /// Draws what was added. Returns the number of samples tested of triangles that are drawn in
-    /// blocks.
+    /// Draws what was added, and empties the batch. Returns the number of samples that were tested, which counts large
+    /// triangles alone: those that are drawn block by block.
     #[inline(always)]
     pub fn draw<const S: usize>(&mut self, context: &RasterContext<'_>, band: &mut SampleBand) -> u64 {
         let len = std::mem::take(&mut self.len).min(ROOM);

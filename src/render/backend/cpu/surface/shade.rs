@@ -122,8 +122,8 @@ impl<'a> Shader<'a> {
         self.colored(id, at)
     }
 
-    /// The colour of triangle `id` at the mean of `count` samples whose offsets in 1/256 px add up
-    /// to `offset_sum`.
+    /// The colour of triangle `id` in pixel (`x`, `y`), at the mean of `count` samples whose offsets from the pixel's
+    /// centre, 1/256 px, add up to `offset_sum`. Transparent where `id` is [`NOTHING`].
     #[inline(always)]
     fn group(&mut self, id: u32, x: u32, y: u32, offset_sum: [i32; 2], count: i32) -> [f32; 4] {
         if id == NOTHING {

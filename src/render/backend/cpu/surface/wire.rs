@@ -51,8 +51,8 @@ pub fn wire_covers<const N: usize>(
     covers
 }
 
-/// The smoothstep of each coordinate by its own exact width, and the minimum of the three, of points
-/// in triangles whose drawn edges `masks` say.
+/// How much a wire covers each point, 0 to 1: one less the smallest smoothstep of the coordinates of drawn edges, each
+/// by its own exact width. `masks` say which edges of each point's triangle are drawn.
 #[inline(always)]
 pub fn fwidth_covers<const N: usize>(masks: &[u8; N], material: &ShadedMaterial, b: &Barycentrics<N>) -> [f32; N] {
     let (thickness, end) = (material.wire_thickness, material.wire_thickness + material.wire_smoothing);

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use super::reflection::constant;
 
 /// The code without the blocks that begin with `if has(FLAG)`, or `if has(FLAG) && ...`, where the key lacks the flag. What
-/// follows `else` stays; an `else if` must not follow.
+/// follows `else` stays.
 ///
 /// In shaders/, the first and the last line of such a block hold nothing else, and begin in the same column.
 pub fn pruned(source: &str, key: u32) -> String {
@@ -22,9 +22,11 @@ pub fn pruned(source: &str, key: u32) -> String {
         let indent = &line[..line.len() - code.len()];
         match left_out {
             Some(of_block) if indent != of_block => continue,
-            Some(_) if code == "} else {" => kept += "{",
-            Some(_) if code != "}" => continue,
-            Some(_) => {}
+            Some(_) if code == "}" => {}
+            Some(_) => match code.strip_prefix("} else ") {
+                Some(rest) => kept += rest,
+                None => continue,
+            },
             None if flag_of_block(code).is_some_and(is_off) => {
                 left_out = Some(indent);
                 continue;

@@ -370,17 +370,25 @@ fn f() {
     if has(A | B) {
         e();
     }
+    if has(B) {
+        b();
+    } else if has(A) {
+        a();
+    } else {
+        d();
+    }
 }
 ";
     let without_blanks =
         |key| pruned(code, key).lines().skip(3).filter(|line| !line.is_empty()).collect::<Vec<_>>().join("");
-    let rest = "    if has(B) || c {        b();    }    if has(A | B) {        e();    }}";
+    let rest = "    if has(B) || c {        b();    }    if has(A | B) {        e();    }";
+    let last = "if has(A) {        a();    } else {        d();    }}";
     let nested = "        if has(B) && c {            b();        }";
-    assert_eq!(without_blanks(0), format!("{{        d();    }}{rest}"));
-    assert_eq!(without_blanks(1), format!("    if has(A) {{        a();    }} else {{        d();    }}{rest}"));
+    assert_eq!(without_blanks(0), format!("{{        d();    }}{rest}{last}"));
+    assert_eq!(without_blanks(1), format!("    if has(A) {{        a();    }} else {{        d();    }}{rest}{last}"));
     assert_eq!(
         without_blanks(3),
-        format!("    if has(A) {{        a();{nested}    }} else {{        d();    }}{rest}")
+        format!("    if has(A) {{        a();{nested}    }} else {{        d();    }}{rest}    if has(B) {{        b();    }} else {last}")
     );
 }
 

@@ -1,4 +1,5 @@
-//! FB_ngon_encoding: the order of triangles encodes polygons.
+//! Reads FB_ngon_encoding, in which the order of triangles encodes polygons: finds which consecutive triangles form one,
+//! and leaves out the diagonals between them.
 //! <https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Vendor/FB_ngon_encoding>
 
 use crate::import::polygon::ALL_EDGES;
