@@ -388,7 +388,9 @@ fn f() {
     assert_eq!(without_blanks(1), format!("    if has(A) {{        a();    }} else {{        d();    }}{rest}{last}"));
     assert_eq!(
         without_blanks(3),
-        format!("    if has(A) {{        a();{nested}    }} else {{        d();    }}{rest}    if has(B) {{        b();    }} else {last}")
+        format!(
+            "    if has(A) {{        a();{nested}    }} else {{        d();    }}{rest}    if has(B) {{        b();    }} else {last}"
+        )
     );
 }
 
