@@ -4,6 +4,9 @@
 //! for each core. A single piece is done by the calling thread. No result depends on the number
 //! of threads.
 
+use std::panic::resume_unwind;
+use std::thread;
+
 use rayon::prelude::*;
 
 /// The results of `each` for some items, in their order.
@@ -66,9 +69,32 @@ pub fn concat_slices<T: Copy + Default + Send + Sync>(lists: &[&[T]]) -> Vec<T> 
     all
 }
 
+/// Runs `work` on `count` threads of its own, and `meanwhile` on this one. Waits for the threads' very ends, after what
+/// they leave to be run there: GPU drivers need that, as `DrawingThreads` says.
+pub fn beside<R>(count: usize, work: impl FnOnce() + Clone + Send, meanwhile: impl FnOnce() -> R) -> R {
+    thread::scope(|scope| {
+        let threads: Vec<_> = (0..count).map(|_| scope.spawn(work.clone())).collect();
+        // What it holds, such as one end of a channel, the threads hold alone.
+        drop(work);
+        let result = meanwhile();
+        threads.into_iter().for_each(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        result
+    })
+}
+
 #[cfg(test)]
 mod tests {
+    use std::sync::mpsc::channel;
+
     use super::*;
+
+    #[test]
+    fn work_is_done_beside_other_work() {
+        let (sender, numbers) = channel();
+        let send = move || sender.send(7).unwrap();
+        // It ends when all senders are gone.
+        assert_eq!(beside(3, send, || numbers.iter().sum::<i32>()), 21);
+    }
 
     #[test]
     fn order_is_kept() {

@@ -1,6 +1,7 @@
 //! Opens the GPU right after the start and makes the pipelines of every style, so that the first
 //! pictures need not wait for that.
 
+use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -52,13 +53,18 @@ impl WarmUp {
 
     /// Waits until the thread has ended, no longer than `time_max`: a driver may crash if the process ends
     /// while a thread uses its device, and it may also hang. True if it has ended.
-    pub fn wait(&self, time_max: Duration) -> bool {
+    pub fn wait(self, time_max: Duration) -> bool {
         let began = Instant::now();
-        let is_running = || self.thread.as_ref().is_some_and(|thread| !thread.is_finished());
-        while is_running() && began.elapsed() < time_max {
+        let Some(thread) = self.thread else { return true };
+        while !thread.is_finished() && began.elapsed() < time_max {
             thread::sleep(Duration::from_millis(2));
         }
-        !is_running()
+        let has_ended = thread.is_finished();
+        if has_ended {
+            // Its panic, if there was one, is in the log.
+            let _ = thread.join();
+        }
+        has_ended
     }
 }
 
@@ -145,6 +151,7 @@ fn make_ready(
     };
     let is_usable = &AtomicBool::new(true);
     thread::scope(|scope| {
+        let making = Cell::new(None);
         let opened = |device: &Arc<dyn GpuDevice>| {
             let device = Arc::clone(device);
             let make_all = move || {
@@ -157,10 +164,12 @@ fn make_ready(
             };
             // Dropping the device may panic, too.
             let make_all = move || drop(catch_unwind(AssertUnwindSafe(make_all)));
-            let _ = thread::Builder::new().name("warm-up".into()).spawn_scoped(scope, make_all);
+            making.set(thread::Builder::new().name("warm-up".into()).spawn_scoped(scope, make_all).ok());
         };
         let device = gpu.device(GpuKind::Hardware, samples, &opened);
         is_usable.store(device.is_ok(), Ordering::Relaxed);
+        // Its panics are caught. A scope by itself does not wait for the very end of a thread.
+        let _ = making.take().map(thread::ScopedJoinHandle::join);
         device.map(drop)
     })
 }

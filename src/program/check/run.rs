@@ -25,6 +25,7 @@ use meshsnap_inspect::check::{self, Check, Verdict, unopened};
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::backend::{Backends, GpuHost, HardwareHint};
 use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::parallel;
 use meshsnap_render::pipeline::Model;
 use meshsnap_render::pluralise::pluralise;
 use meshsnap_render::spec::NamedView;
@@ -111,21 +112,18 @@ impl<'a> Run<'a> {
         let threads = self.arguments.jobs.map_or(cores() as usize, usize::from).min(self.tasks.all.len());
         let next = AtomicUsize::new(0);
         let (sender, outcomes) = channel();
-        let RunFindings { verdicts, pictures, lost, failure } = std::thread::scope(|scope| {
-            for _ in 0..threads {
-                let (sender, next) = (sender.clone(), &next);
-                scope.spawn(move || {
-                    // Many files keep all processors busy: each is read by one thread.
-                    let threads_of_one = if threads == 1 { cores() as usize } else { 1 };
-                    let drawing = Arc::new(DrawingThreads::new(threads_of_one));
-                    drawing.install(|| {
-                        let mut backends = Backends::sharing(self.gpu.clone(), drawing.clone());
-                        let mut done = |number, outcome| drop(sender.send((number, outcome)));
-                        self.work(next, &mut backends, &mut done);
-                    });
-                });
-            }
-            drop(sender);
+        let of_all = &next;
+        let work = move || {
+            // Many files keep all processors busy: each is read by one thread.
+            let threads_of_one = if threads == 1 { cores() as usize } else { 1 };
+            let drawing = Arc::new(DrawingThreads::new(threads_of_one));
+            drawing.install(|| {
+                let mut backends = Backends::sharing(self.gpu.clone(), drawing.clone());
+                let mut done = |number, outcome| drop(sender.send((number, outcome)));
+                self.work(of_all, &mut backends, &mut done);
+            });
+        };
+        let RunFindings { verdicts, pictures, lost, failure } = parallel::beside(threads, work, || {
             // Where nobody reads the verdicts, no more are made.
             self.print(&outcomes).inspect_err(|_| next.store(self.tasks.all.len(), Ordering::Relaxed))
         })?;

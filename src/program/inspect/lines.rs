@@ -20,6 +20,7 @@ use meshsnap_inspect::report::Report;
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::import::Options;
 use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::parallel;
 use meshsnap_server::config::cores;
 
 /// A line: the path, and the report or the reason why there is none.
@@ -62,25 +63,20 @@ impl Run<'_> {
         let threads = (cores() as usize).min(all.len());
         let next = AtomicUsize::new(0);
         let (sender, outcomes) = channel();
-        let failure = std::thread::scope(|scope| {
-            for _ in 0..threads {
-                let (sender, next) = (sender.clone(), &next);
-                scope.spawn(move || {
-                    // Many files keep all processors busy: each is read by one thread.
-                    let reading = DrawingThreads::new(if threads == 1 { cores() as usize } else { 1 });
-                    reading.install(|| {
-                        while let Some((number, task)) = take(next, all) {
-                            // Where nobody reads the lines, no more are made.
-                            if sender.send((number, self.outcome(task))).is_err() {
-                                break;
-                            }
-                        }
-                    });
-                });
-            }
-            drop(sender);
-            print(outcomes, all.len())
-        })?;
+        let of_all = &next;
+        let work = move || {
+            // Many files keep all processors busy: each is read by one thread.
+            let reading = DrawingThreads::new(if threads == 1 { cores() as usize } else { 1 });
+            reading.install(|| {
+                while let Some((number, task)) = take(of_all, all) {
+                    // Where nobody reads the lines, no more are made.
+                    if sender.send((number, self.outcome(task))).is_err() {
+                        break;
+                    }
+                }
+            });
+        };
+        let failure = parallel::beside(threads, work, || print(outcomes, all.len()))?;
         // The sentences are said already.
         failure.map_or(Ok(()), |code| Err(CliError::silent(code)))
     }

@@ -19,6 +19,7 @@ use crate::siblings::{self, Read};
 use meshsnap_render::backend::cpu::DrawingThreads;
 use meshsnap_render::backend::{Backends, GpuHost, HardwareHint};
 use meshsnap_render::limits::{Budget, Deadline, Limits};
+use meshsnap_render::parallel;
 use meshsnap_render::pipeline::{self, Context, Job, Output};
 use meshsnap_render::spec::Spec;
 use meshsnap_server::config::{cores, why_no_gpu};
@@ -68,16 +69,9 @@ impl Batch<'_> {
         };
         let threads = self.arguments.threads.map_or(cores() as usize, usize::from).min(self.tasks.all.len());
         let (sender, outcomes) = channel();
-        let (drawn, failures) = std::thread::scope(|scope| {
-            for _ in 0..threads {
-                let (sender, shared) = (sender.clone(), &shared);
-                scope.spawn(move || {
-                    self.work(shared, &mut |number, outcome| drop(sender.send((number, outcome))));
-                });
-            }
-            drop(sender);
-            self.report(&outcomes)
-        });
+        let of_all = &shared;
+        let work = move || self.work(of_all, &mut |number, outcome| drop(sender.send((number, outcome))));
+        let (drawn, failures) = parallel::beside(threads, work, || self.report(&outcomes));
         if !self.tasks.is_part {
             self.mention_unused(&shared);
         }

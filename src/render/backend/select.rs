@@ -1,5 +1,6 @@
 //! Choice of a back-end per job, and recovery when the GPU fails.
 
+use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::thread;
@@ -182,15 +183,20 @@ impl Backends {
     /// end is waited for even if the probe fails: a compiling driver cannot be stopped.
     fn find_device(&self, kind: GpuKind, plan: &DrawPlan<'_>) -> Result<Arc<dyn GpuDevice>, DrawError> {
         thread::scope(|scope| {
-            self.host.device(kind, plan.samples, &|device| {
+            let making = Cell::new(None);
+            let found = self.host.device(kind, plan.samples, &|device| {
                 let device = device.clone();
                 // If this fails, drawing makes them again, and reports the error.
                 let make_ready = move || {
                     let _ = catch_unwind(AssertUnwindSafe(|| device.make_ready(plan)));
                     drop_catching_panics(device);
                 };
-                let _ = thread::Builder::new().name("make-ready".into()).spawn_scoped(scope, make_ready);
-            })
+                making.set(thread::Builder::new().name("make-ready".into()).spawn_scoped(scope, make_ready).ok());
+            });
+            // Its panics are caught. A scope by itself does not wait for the very end of a thread, and drivers need that: see
+            // `DrawingThreads`.
+            let _ = making.take().map(thread::ScopedJoinHandle::join);
+            found
         })
     }
 

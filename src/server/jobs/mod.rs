@@ -383,8 +383,10 @@ impl Jobs {
         while workers.iter().any(|worker| !worker.is_finished()) && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(2));
         }
-        // Threads that still run are detached, because the process is about to end.
-        workers.clear();
+        for worker in workers.drain(..).filter(JoinHandle::is_finished) {
+            // Its panic, if there was one, is in the log. Those that still run are detached: the process is about to end.
+            let _ = worker.join();
+        }
     }
 }
 

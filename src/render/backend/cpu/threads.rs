@@ -6,6 +6,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
 
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -18,6 +19,8 @@ pub const CHUNK: usize = 8192;
 pub struct DrawingThreads {
     /// None: there is one thread, which is the caller's.
     pool: Option<ThreadPool>,
+    /// The pool's threads.
+    handles: Vec<JoinHandle<()>>,
     /// Pictures that are being drawn.
     drawing: AtomicUsize,
 }
@@ -32,10 +35,16 @@ pub struct ThreadShare<'a> {
 impl DrawingThreads {
     /// A pool of `count` threads, or of one if the system gives no more.
     pub fn new(count: usize) -> Self {
-        let build = || ThreadPoolBuilder::new().num_threads(count).thread_name(|i| format!("raster-{i}"));
+        let mut handles = Vec::new();
+        let spawn = |thread: rayon::ThreadBuilder| {
+            let named = thread::Builder::new().name(format!("raster-{}", thread.index()));
+            handles.push(named.spawn(|| thread.run())?);
+            Ok(())
+        };
         // One thread needs no pool.
-        let pool = if count > 1 { build().build().ok() } else { None };
-        Self { pool, drawing: AtomicUsize::new(0) }
+        let build = || ThreadPoolBuilder::new().num_threads(count).spawn_handler(spawn).build().ok();
+        let pool = if count > 1 { build() } else { None };
+        Self { pool, handles, drawing: AtomicUsize::new(0) }
     }
 
     /// The number of threads.
@@ -61,6 +70,24 @@ impl DrawingThreads {
     /// Threads for each of the pictures that are being drawn now.
     fn part(&self) -> usize {
         (self.count() / self.drawing.load(Ordering::Relaxed).max(1)).max(1)
+    }
+}
+
+/// Waits for the threads' ends. A thread that has called a GPU's driver calls it once more at its very end. NVIDIA's
+/// (580.159) waits for ever if the device is destroyed at that moment: one process in a hundred hung at its exit.
+impl Drop for DrawingThreads {
+    fn drop(&mut self) {
+        // Rayon asks its threads to end, and does not wait.
+        self.pool = None;
+        let own = thread::current().id();
+        if self.handles.iter().any(|handle| handle.thread().id() == own) {
+            // They end when the work is done that drops them.
+            return;
+        }
+        for handle in self.handles.drain(..) {
+            // Rayon's threads do not panic: it hands on the panics of what they run.
+            let _ = handle.join();
+        }
     }
 }
 
@@ -107,7 +134,9 @@ pub fn map<T: Send, U: Send>(pool: Option<&ThreadPool>, items: Vec<T>, each: imp
 
 #[cfg(test)]
 mod tests {
-    use std::sync::mpsc;
+    use std::cell::Cell;
+    use std::sync::{Arc, mpsc};
+    use std::time::Duration;
 
     use super::*;
 
@@ -127,6 +156,41 @@ mod tests {
         assert_eq!((one.share().count, one.share().pool().is_some()), (1, false));
     }
 
+    /// What a thread leaves to its very end, as drivers do.
+    struct AtTheEnd(Arc<AtomicUsize>);
+
+    impl Drop for AtTheEnd {
+        fn drop(&mut self) {
+            thread::sleep(Duration::from_millis(20));
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    #[test]
+    fn threads_have_ended_when_their_pool_is_gone() {
+        thread_local!(static LEFT: Cell<Option<AtTheEnd>> = const { Cell::new(None) });
+        let ended = Arc::new(AtomicUsize::new(0));
+        let threads = DrawingThreads::new(3);
+        threads.pool.as_ref().unwrap().broadcast(|_| LEFT.set(Some(AtTheEnd(ended.clone()))));
+        drop(threads);
+        assert_eq!(ended.load(Ordering::Relaxed), 3);
+    }
+
+    #[test]
+    fn one_of_the_threads_may_be_the_last_that_has_them() {
+        let (ended, end) = mpsc::channel();
+        let threads = Arc::new(DrawingThreads::new(2));
+        let own = threads.clone();
+        let (gone, is_gone) = mpsc::channel::<()>();
+        threads.pool.as_ref().unwrap().spawn(move || {
+            let _ = is_gone.recv();
+            drop(own);
+            ended.send(()).unwrap();
+        });
+        drop((threads, gone));
+        end.recv().unwrap();
+    }
+
     /// Picture 1 has four threads and a thousand bands. The first four are let go when picture 2 has
     /// begun, and the others when it is drawn. So two threads of picture 1 are left to picture 2.
     #[test]
@@ -139,7 +203,7 @@ mod tests {
         let others_gate = Mutex::new(others_gate);
         let (drawn, second_drawn) = mpsc::channel();
         let finished = AtomicUsize::new(0);
-        std::thread::scope(|scope| {
+        thread::scope(|scope| {
             let (threads, finished) = (&threads, &finished);
             scope.spawn(move || {
                 threads.share().run(4, 0..1000, |band| {
