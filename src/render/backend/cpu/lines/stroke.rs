@@ -158,11 +158,14 @@ dispatch! {
 }
 
 #[inline(always)]
-fn places_kernel(direction: [i16; 2], places: &mut PerPoint) {
+fn places_kernel([x, y]: [i16; 2], places: &mut PerPoint) {
     for ((right, down), places) in LATTICE[0].iter().zip(&LATTICE[1]).zip(places) {
+        // Complete before it is stored: the compiler must not wonder whether a store changes the direction.
+        let mut row = [0; WORDS];
         for l in 0..WORDS {
-            places[l] = place(direction, [right[l], down[l]]);
+            row[l] = place([x, y], [right[l], down[l]]);
         }
+        *places = row;
     }
 }
 
