@@ -7,7 +7,7 @@ use super::PlanError;
 use super::cut_outs::{CutOuts, MaskedFaces, masked};
 use super::edges::face_runs::FaceRuns;
 use super::edges::silhouettes::Silhouettes;
-use super::lines::picked_faces::looked_at;
+use super::lines::picked_faces::{PickedFace, picked_faces};
 use super::prepared::{Fact, Prepared};
 use super::skips::{SkipKind, Skips};
 use crate::limits::{Budget, Deadline, LimitExceeded};
@@ -39,7 +39,7 @@ pub struct PlanContext<'c> {
     edges: Option<Arc<EdgeList>>,
     silhouettes: Option<Arc<Silhouettes>>,
     face_runs: Option<Arc<FaceRuns>>,
-    looked_at: Option<Arc<Vec<u32>>>,
+    picked_faces: Option<Arc<Vec<PickedFace>>>,
 }
 
 impl<'c> PlanContext<'c> {
@@ -56,7 +56,7 @@ impl<'c> PlanContext<'c> {
             edges: None,
             silhouettes: None,
             face_runs: None,
-            looked_at: None,
+            picked_faces: None,
         }
     }
 
@@ -88,13 +88,13 @@ impl<'c> PlanContext<'c> {
     }
 
     /// The faces that are looked at for the width of lines, found when a style first needs them.
-    pub fn looked_at(&mut self, mesh: &Mesh) -> Result<Arc<Vec<u32>>, PlanError> {
-        if let Some(looked_at) = &self.looked_at {
-            return Ok(Arc::clone(looked_at));
+    pub fn picked_faces(&mut self, mesh: &Mesh) -> Result<Arc<Vec<PickedFace>>, PlanError> {
+        if let Some(picked) = &self.picked_faces {
+            return Ok(Arc::clone(picked));
         }
         self.deadline.check()?;
-        let found = self.fact(|prepared| &prepared.looked_at, |budget| looked_at(mesh, budget))?;
-        Ok(Arc::clone(self.looked_at.insert(found)))
+        let found = self.fact(|prepared| &prepared.picked_faces, |budget| picked_faces(mesh, budget))?;
+        Ok(Arc::clone(self.picked_faces.insert(found)))
     }
 
     /// The runs of the mesh's faces, found when a stage first needs them.

@@ -11,6 +11,7 @@ use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::Orientation;
 use crate::plan::cut_outs::CutOuts;
 use crate::plan::edges::face_runs::FaceRuns;
+use crate::plan::lines::picked_faces::PickedFace;
 use crate::texture::kept::KeptTextures;
 
 /// Facts about one mesh, which must not change. Each is found when a plan first needs it. Plans that
@@ -23,7 +24,7 @@ pub struct Prepared {
     pub(super) edges: Fact<EdgeList>,
     orientation: OnceLock<Orientation>,
     /// The faces that are looked at for the width of lines.
-    pub(super) looked_at: Fact<Vec<u32>>,
+    pub(super) picked_faces: Fact<Vec<PickedFace>>,
     /// The runs of faces.
     pub(super) face_runs: Fact<FaceRuns>,
     /// Visible parts of the faces with cut-out textures.
@@ -97,10 +98,10 @@ impl Prepared {
     pub fn bytes(&self) -> u64 {
         let edges = self.edges.known().map_or(0, EdgeList::bytes);
         let normals = self.locked_normals().as_ref().map_or(0, VertexNormals::bytes);
-        let looked_at = self.looked_at.known().map_or(0, |faces| size_of_val(&faces[..]));
+        let picked = self.picked_faces.known().map_or(0, |faces| size_of_val(&faces[..]));
         let runs = self.face_runs.known().map_or(0, FaceRuns::bytes);
         let cut_outs = self.cut_outs.known().map_or(0, CutOuts::bytes);
-        (edges + normals + looked_at + runs + cut_outs) as u64 + self.textures.bytes()
+        (edges + normals + picked + runs + cut_outs) as u64 + self.textures.bytes()
     }
 
     fn locked_normals(&self) -> MutexGuard<'_, Option<VertexNormals>> {

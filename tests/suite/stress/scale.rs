@@ -1,8 +1,13 @@
 //! A model is the same model in millimetres and in light years.
 
+use meshsnap_render::backend::Renderer as _;
 use meshsnap_render::backend::cpu::CpuRenderer;
+use meshsnap_render::image::Image;
+use meshsnap_render::limits::Deadline;
 use meshsnap_render::mesh::Mesh;
 
+use crate::oracle::obj::Shape;
+use crate::oracle::vector::V3;
 use crate::support::families::moved::{LOOKS, MESHES, differing, draw, is_blank, shape};
 use crate::support::scenes;
 use crate::support::truth::{cases, renderers};
@@ -91,4 +96,69 @@ fn other_scales_differ_in_hardly_a_pixel() {
     assert_eq!(compared, MESHES.len() * 2 * LOOKS.len());
     assert!(different as f64 <= DIFFERING_MAX * pixels as f64, "{different} of {pixels} pixels differ");
     assert!(missed.is_empty(), "{}", missed.join("\n"));
+}
+
+/// All presets.
+const STYLES: [&str; 12] = [
+    "auto",
+    "flat",
+    "smooth",
+    "unlit",
+    "wire",
+    "wireframe",
+    "outline",
+    "hidden-line",
+    "topology",
+    "technical",
+    "clay",
+    "xray",
+];
+
+/// A sheet of so many faces that the width of its lines is found by some of them. They grow from one corner on, so that a few
+/// large ones have most of the area.
+fn uneven() -> Shape {
+    let along = |i: usize, n: f64| (i as f64 / n).powf(2.5);
+    Shape::net([120, 60], |i, j| {
+        let [u, v] = [along(i, 120.0), along(j, 60.0)];
+        [2.0 * u - 1.0, 2.0 * v - 1.0, 0.3 * (5.0 * u).sin() * (4.0 * v).cos()]
+    })
+}
+
+/// Pixels of which some channel differs by more than two steps.
+fn differing_clearly(a: &Image, b: &Image) -> usize {
+    let pixels = a.rgba.chunks(4).zip(b.rgba.chunks(4));
+    pixels.filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > 2)).count()
+}
+
+#[test]
+fn no_style_depends_on_the_unit_or_the_axes_of_a_file() {
+    let original = scenes::mesh(&uneven().text());
+    assert!(original.triangles.len() > 8192);
+    // The same mesh with z up: seen from where the other one is seen from.
+    let turned = uneven().map(|[x, y, z]: V3| [x, -z, y]).text();
+    let mut copies = vec![("turned".to_owned(), scenes::mesh(&turned), "z")];
+    for factor in [3.0, 0.1, 7e10, 1e30, 1e-30] {
+        let scaled = uneven().map(|v| v.map(|c| c * factor)).text();
+        copies.push((format!("times {factor:e}"), scenes::mesh(&scaled), "y"));
+    }
+    let mut renderer = CpuRenderer::new(2);
+    let mut compared = 0;
+    for style in STYLES {
+        let mut draw = |mesh: &Mesh, up: &'static str| {
+            let keys = [("style", style), ("camera.up", up), ("size", "384")];
+            renderer.draw(&scenes::plan(mesh, &scenes::spec(&keys)), &Deadline::default()).unwrap()
+        };
+        let want = draw(&original, "y");
+        let pixels = want.rgba.len() / 4;
+        for (name, copy, up) in &copies {
+            let count = differing_clearly(&want, &draw(copy, up));
+            println!("- {style}, {name}: {count} of {pixels} pixels differ");
+            assert!(
+                count as f64 <= DIFFERING_MAX * pixels as f64,
+                "{style}, {name}: {count} of {pixels} pixels differ"
+            );
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 12 * 6);
 }

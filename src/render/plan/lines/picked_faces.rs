@@ -1,42 +1,205 @@
-//! The faces by which the width of lines is found: all of a small mesh, and a few of a large one.
+//! The faces by which the width of lines is found: all of a small mesh, and some of a large one.
 
 use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::parallel;
 
-/// Faces that are looked at, about: of a larger mesh, those that a hash of their corners' places picks.
-const LOOKED_AT: usize = 1 << 11;
+/// Faces that are picked of a larger mesh, about.
+const PICKED: usize = 1 << 12;
 
 /// Faces that a thread takes at a time.
 const CHUNK: usize = 1 << 14;
 
-/// The faces of a mesh that are looked at, in order. They are about [`LOOKED_AT`] to twice as many, unless
-/// an unlucky mesh has equal hashes: so they are counted first, and paid for.
-pub fn looked_at(mesh: &Mesh, budget: &mut Budget) -> Result<Vec<u32>, LimitExceeded> {
-    let count = mesh.triangles.len();
-    // One in so many faces, a power of two.
-    let one_in = 1_u64 << (count / LOOKED_AT).max(1).ilog2();
-    let picked = |first: usize| {
-        let faces = first..count.min(first + CHUNK);
-        faces.filter(|&face| hash_of(mesh, face).is_multiple_of(one_in))
-    };
-    let firsts = || (0..count).step_by(CHUNK);
-    let counts = parallel::map(firsts().collect(), |first| picked(first).count());
-    budget.spend("the width of lines", counts.iter().sum::<usize>() as u64, 2 * 4)?;
-    let collect = |(first, count)| {
-        let mut faces = Vec::with_capacity(count);
-        faces.extend(picked(first).map(|face| face as u32));
-        faces
-    };
-    Ok(parallel::map(firsts().zip(counts).collect(), collect).concat())
+/// Areas are counted in such parts of the square of the longest side of the mesh's box: sums of whole numbers do not
+/// depend on an order. A face is smaller than that square, so that 64 bits hold the sum of a chunk.
+const AREA_UNITS: f64 = (1_u64 << 40) as f64;
+
+/// Steps of places along half the longest side of the mesh's box. They are much larger than what scaling a mesh changes
+/// by rounding.
+const PLACES: f32 = 2048.0;
+
+/// A face that is looked at, and how many such faces it stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PickedFace {
+    /// The face.
+    pub face: u32,
+    /// At least 1.
+    pub weight: f32,
 }
 
-/// A number from the places of a face's corners, the same for any order of them.
-fn hash_of(mesh: &Mesh, face: usize) -> u64 {
-    let mut sum = 0_u64;
-    for corner in mesh.triangles[face] {
-        let [x, y, z] = mesh.positions[corner as usize].map(|v| u64::from(v.to_bits()));
-        sum = sum.wrapping_add((x ^ y << 21 ^ z << 42).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+/// The faces of a mesh that are looked at, in order.
+///
+/// The larger a face, the more likely it is picked, so that all of them stand for about the same area. Those larger than
+/// the [`PICKED`]th part of the mesh are always picked. What decides about a face depends on its shape and place alone:
+/// a mesh that is scaled, mirrored, turned by right angles, or written in another order has the same faces picked, but
+/// for the few that rounding moves past a step.
+pub fn picked_faces(mesh: &Mesh, budget: &mut Budget) -> Result<Vec<PickedFace>, LimitExceeded> {
+    let count = mesh.triangles.len();
+    if count <= PICKED {
+        budget.spend("the width of lines", count as u64, 2 * size_of::<PickedFace>() as u64)?;
+        return Ok((0..count as u32).map(|face| PickedFace { face, weight: 1.0 }).collect());
     }
-    (sum ^ sum >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93) >> 32
+    budget.spend("the width of lines", count.div_ceil(WORD) as u64, size_of::<u64>() as u64)?;
+    let dice = Dice::new(mesh);
+    // A bit per face. An unlucky mesh has equal hashes: so those that are picked are counted before they are listed.
+    let mut words = vec![0_u64; count.div_ceil(WORD)];
+    let chunks = words.chunks_mut(CHUNK / WORD).enumerate().collect();
+    let counts = parallel::map(chunks, |(number, words): (usize, &mut [u64])| {
+        let faces = number * CHUNK..count.min((number + 1) * CHUNK);
+        faces.clone().filter(|&face| dice.picks(mesh, face)).map(|face| set(words, face - faces.start)).count()
+    });
+    budget.spend("the width of lines", counts.iter().sum::<usize>() as u64, size_of::<PickedFace>() as u64)?;
+    let mut picked = Vec::with_capacity(counts.iter().sum());
+    for (first, word) in (0..).step_by(WORD).zip(words) {
+        let mut left = word;
+        while left != 0 {
+            let face = first + left.trailing_zeros() as usize;
+            left &= left - 1;
+            picked.push(PickedFace { face: face as u32, weight: dice.weight(area(mesh, face)) });
+        }
+    }
+    Ok(picked)
+}
+
+/// Bits of a word.
+const WORD: usize = u64::BITS as usize;
+
+fn set(words: &mut [u64], bit: usize) {
+    words[bit / WORD] |= 1 << (bit % WORD);
+}
+
+/// What decides which faces are picked.
+struct Dice {
+    /// The middle of the mesh's box, and steps of places per unit.
+    middle: [f32; 3],
+    steps: f32,
+    /// The area of all faces over [`PICKED`].
+    area_each: f64,
+}
+
+impl Dice {
+    fn new(mesh: &Mesh) -> Self {
+        let [low, high] = mesh.bounds;
+        let half = (0..3).map(|k| 0.5 * (high[k] - low[k])).fold(f32::MIN_POSITIVE, f32::max);
+        let unit = AREA_UNITS / (4.0 * f64::from(half) * f64::from(half));
+        let count = mesh.triangles.len();
+        let sum = |first: usize| {
+            let faces = first..count.min(first + CHUNK);
+            faces.map(|face| (unit * area(mesh, face)) as u64).sum::<u64>()
+        };
+        let sums = parallel::map((0..count).step_by(CHUNK).collect(), sum);
+        let all: u128 = sums.into_iter().map(u128::from).sum();
+        let middle = std::array::from_fn(|k| 0.5 * (low[k] + high[k]));
+        Self { middle, steps: PLACES / half, area_each: all as f64 / unit / PICKED as f64 }
+    }
+
+    /// True if a face is picked.
+    fn picks(&self, mesh: &Mesh, face: usize) -> bool {
+        f64::from(self.throw(mesh, face)) * self.area_each < area(mesh, face) * f64::from(u32::MAX)
+    }
+
+    /// How many faces a picked one of this area stands for.
+    fn weight(&self, area: f64) -> f32 {
+        (self.area_each / area).max(1.0) as f32
+    }
+
+    /// A number from the places of a face's corners, the same for any order of them and of their coordinates, and for
+    /// mirrored ones.
+    fn throw(&self, mesh: &Mesh, face: usize) -> u32 {
+        let mut sum = 0_u32;
+        for corner in mesh.triangles[face] {
+            let mut of_corner = 0_u32;
+            for (v, middle) in mesh.positions[corner as usize].iter().zip(self.middle) {
+                let step = ((v - middle).abs() * self.steps + 0.5) as i32 as u32;
+                of_corner =
+                    of_corner.wrapping_add(step.wrapping_mul(step).wrapping_add(step.wrapping_mul(0x9e37_79b9)));
+            }
+            sum = sum.wrapping_add((of_corner ^ of_corner >> 15).wrapping_mul(0x2c1b_3c6d));
+        }
+        let mixed = (sum ^ sum >> 12).wrapping_mul(0x297a_2d39);
+        mixed ^ mixed >> 15
+    }
+}
+
+fn area(mesh: &Mesh, face: usize) -> f64 {
+    let [a, b, c] = mesh.triangles[face].map(|corner| mesh.positions[corner as usize].map(f64::from));
+    let [u, v]: [[f64; 3]; 2] = [b, c].map(|p| std::array::from_fn(|k| p[k] - a[k]));
+    let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    0.5 * (cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::Limits;
+
+    /// A sheet of 2 n^2 triangles that grow from one corner on, with its vertices moved by `place`.
+    fn sheet(n: usize, place: impl Fn([f32; 3]) -> [f32; 3]) -> Mesh {
+        let along = |i: usize| 2.0 * (i as f32 / n as f32).powf(2.5) - 1.0;
+        let vertices = (0..(n + 1) * (n + 1)).map(|i| [along(i % (n + 1)), along(i / (n + 1)), 0.0]);
+        let positions: Vec<[f32; 3]> = vertices.map(place).collect();
+        let squares = (0..n * n).map(|i| (i / n * (n + 1) + i % n) as u32);
+        let next = n as u32 + 1;
+        let triangles = squares.flat_map(|a| [[a, a + 1, a + next], [a + 1, a + next + 1, a + next]]).collect();
+        let bound =
+            |choose: fn(f32, f32) -> f32| [0, 1, 2].map(|k| positions.iter().map(|p| p[k]).reduce(choose).unwrap());
+        Mesh { bounds: [bound(f32::min), bound(f32::max)], triangles, positions, ..Mesh::default() }
+    }
+
+    fn picked(mesh: &Mesh) -> Vec<PickedFace> {
+        picked_faces(mesh, &mut Budget::new(&Limits::default())).unwrap()
+    }
+
+    #[test]
+    fn picked_faces_stand_for_all() {
+        let small = sheet(45, |p| p);
+        assert!(picked(&small).into_iter().eq((0..4050).map(|face| PickedFace { face, weight: 1.0 })));
+        for n in [46, 100, 400] {
+            let mesh = sheet(n, |p| p);
+            let picked = picked(&mesh);
+            assert!((500..=PICKED + 200).contains(&picked.len()), "{n}: {} faces", picked.len());
+            // The area of faces, less what is closer than a distance to their sides: the sum for which they are picked.
+            let free = |face: usize, distance: f64| {
+                let [a, b, c] = mesh.triangles[face].map(|v| mesh.positions[v as usize].map(f64::from));
+                let length = |p: [f64; 3], q: [f64; 3]| (p[0] - q[0]).hypot(p[1] - q[1]);
+                let radius = 2.0 * area(&mesh, face) / (length(a, b) + length(b, c) + length(c, a));
+                area(&mesh, face) * (1.0 - distance / radius).max(0.0).powi(2)
+            };
+            let of_all = |distance| (0..mesh.triangles.len()).map(|face| free(face, distance)).sum::<f64>();
+            let of_picked = |distance| {
+                let free = |one: &PickedFace| f64::from(one.weight) * free(one.face as usize, distance);
+                picked.iter().map(free).sum::<f64>()
+            };
+            // A sum of some 4096 faces, which symmetry picks in pairs.
+            assert!((of_picked(0.0) / of_all(0.0) - 1.0).abs() < 0.05, "{n}: {} of {}", of_picked(0.0), of_all(0.0));
+            for distance in [1e-4, 1e-3] {
+                let [want, got] = [of_all(distance) / of_all(0.0), of_picked(distance) / of_picked(0.0)];
+                assert!((got - want).abs() < 0.01, "{n}, {distance}: {got} for {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn neither_scale_nor_axes_nor_order_change_what_is_picked() {
+        let of = |mesh: &Mesh| picked(mesh).iter().map(|one| one.face).collect::<Vec<_>>();
+        let mesh = sheet(150, |p| p);
+        let want = of(&mesh);
+        assert!(of(&sheet(150, |[x, y, z]| [x, -z, y])) == want, "turned");
+        assert!(of(&sheet(150, |[x, y, z]| [-y, z, x])) == want, "turned twice");
+        assert!(of(&sheet(150, |p| p.map(|v| v * 0.25))) == want, "a quarter");
+        let mut others = 0;
+        for factor in [0.3, 0.7, 0.9] {
+            let got = of(&sheet(150, |p| p.map(|v| v * factor)));
+            others += got.iter().filter(|face| !want.contains(face)).count();
+        }
+        assert!(others < want.len() / 50, "{others} of {}", 3 * want.len());
+        let last = mesh.triangles.len() as u32 - 1;
+        let mut reversed =
+            Mesh { triangles: mesh.triangles.iter().rev().map(|&[a, b, c]| [b, a, c]).collect(), ..mesh };
+        let mut got: Vec<u32> = of(&reversed).iter().map(|face| last - face).collect();
+        got.reverse();
+        assert!(got == want, "reversed");
+        reversed.positions.iter_mut().for_each(|p| *p = [0.0; 3]);
+        assert!(of(&reversed).is_empty(), "without an area, none is picked");
+    }
 }

@@ -4,6 +4,7 @@ mod open_edges;
 
 pub use open_edges::open_edges;
 
+use super::picked_faces::PickedFace;
 use crate::mesh::Mesh;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
 use crate::plan::{PX, PlanError, Projection, Projector};
@@ -52,13 +53,12 @@ impl AutoWidth {
         has_lines: impl Fn(usize) -> bool,
         cx: &mut PlanContext<'_>,
     ) -> Result<Self, PlanError> {
-        let looked_at = cx.looked_at(scene.mesh)?;
+        let picked = cx.picked_faces(scene.mesh)?;
         let view = View::new(scene, are_polygons);
         let mut sizes = FaceSizes([0; CLASSES]);
-        for faces in looked_at.chunks(CHECK_EVERY) {
+        for faces in picked.chunks(CHECK_EVERY) {
             cx.deadline.check()?;
-            let faces = faces.iter().map(|&face| face as usize);
-            sizes.add(&view, faces.filter(|&face| has_lines(face)));
+            sizes.add(&view, faces.iter().filter(|picked| has_lines(picked.face as usize)));
         }
         Ok(Self::around(&sizes))
     }
@@ -88,9 +88,11 @@ struct FaceSizes([u64; CLASSES]);
 
 impl FaceSizes {
     /// Adds faces but those with a corner behind the near plane or the centre outside the picture.
-    fn add(&mut self, view: &View<'_>, faces: impl Iterator<Item = usize>) {
-        for [area, diameter] in faces.filter_map(|face| view.size_of(face)) {
-            self.0[class_of(diameter)] += (area * 256.0).round() as u64;
+    fn add<'a>(&mut self, view: &View<'_>, faces: impl Iterator<Item = &'a PickedFace>) {
+        for picked in faces {
+            if let Some([area, diameter]) = view.size_of(picked.face as usize) {
+                self.0[class_of(diameter)] += (area * f64::from(picked.weight) * 256.0).round() as u64;
+            }
         }
     }
 
