@@ -84,9 +84,30 @@ pub fn beside<R>(count: usize, work: impl FnOnce() + Clone + Send, meanwhile: im
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+    use std::sync::atomic::{AtomicUsize, Ordering};
     use std::sync::mpsc::channel;
+    use std::time::Duration;
 
     use super::*;
+
+    /// What a thread leaves to its very end, as drivers do.
+    struct AtTheEnd<'a>(&'a AtomicUsize);
+
+    impl Drop for AtTheEnd<'_> {
+        fn drop(&mut self) {
+            thread::sleep(Duration::from_millis(20));
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    #[test]
+    fn threads_beside_have_ended_when_all_is_done() {
+        static ENDED: AtomicUsize = AtomicUsize::new(0);
+        thread_local!(static LEFT: Cell<Option<AtTheEnd<'static>>> = const { Cell::new(None) });
+        beside(4, || LEFT.set(Some(AtTheEnd(&ENDED))), || ());
+        assert_eq!(ENDED.load(Ordering::Relaxed), 4);
+    }
 
     #[test]
     fn work_is_done_beside_other_work() {
