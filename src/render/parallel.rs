@@ -4,7 +4,7 @@
 //! for each core. A single piece is done by the calling thread. No result depends on the number
 //! of threads.
 
-use std::panic::resume_unwind;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::thread;
 
 use rayon::prelude::*;
@@ -76,9 +76,12 @@ pub fn beside<R>(count: usize, work: impl FnOnce() + Clone + Send, meanwhile: im
         let threads: Vec<_> = (0..count).map(|_| scope.spawn(work.clone())).collect();
         // What it holds, such as one end of a channel, the threads hold alone.
         drop(work);
-        let result = meanwhile();
-        threads.into_iter().for_each(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)));
-        result
+        let result = catch_unwind(AssertUnwindSafe(meanwhile));
+        let ends: Vec<_> = threads.into_iter().map(thread::ScopedJoinHandle::join).collect();
+        if let Some(panic) = ends.into_iter().find_map(Result::err) {
+            resume_unwind(panic);
+        }
+        result.unwrap_or_else(|panic| resume_unwind(panic))
     })
 }
 

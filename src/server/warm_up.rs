@@ -1,7 +1,7 @@
 //! Opens the GPU right after the start and makes the pipelines of every style, so that the first
 //! pictures need not wait for that.
 
-use std::cell::Cell;
+use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -61,7 +61,7 @@ impl WarmUp {
         }
         let has_ended = thread.is_finished();
         if has_ended {
-            // Its panic, if there was one, is in the log.
+            // Its panic, if there was one, is in the log. What is left of it is a call of the driver, which is short.
             let _ = thread.join();
         }
         has_ended
@@ -151,7 +151,7 @@ fn make_ready(
     };
     let is_usable = &AtomicBool::new(true);
     thread::scope(|scope| {
-        let making = Cell::new(None);
+        let making = RefCell::new(Vec::new());
         let opened = |device: &Arc<dyn GpuDevice>| {
             let device = Arc::clone(device);
             let make_all = move || {
@@ -164,12 +164,14 @@ fn make_ready(
             };
             // Dropping the device may panic, too.
             let make_all = move || drop(catch_unwind(AssertUnwindSafe(make_all)));
-            making.set(thread::Builder::new().name("warm-up".into()).spawn_scoped(scope, make_all).ok());
+            making.borrow_mut().extend(thread::Builder::new().name("warm-up".into()).spawn_scoped(scope, make_all));
         };
         let device = gpu.device(GpuKind::Hardware, samples, &opened);
         is_usable.store(device.is_ok(), Ordering::Relaxed);
-        // Its panics are caught. A scope by itself does not wait for the very end of a thread.
-        let _ = making.take().map(thread::ScopedJoinHandle::join);
+        // Their panics are caught. A scope by itself does not wait for the very end of a thread.
+        for thread in making.take() {
+            let _ = thread.join();
+        }
         device.map(drop)
     })
 }

@@ -1,6 +1,6 @@
 //! Choice of a back-end per job, and recovery when the GPU fails.
 
-use std::cell::Cell;
+use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::thread;
@@ -183,7 +183,7 @@ impl Backends {
     /// end is waited for even if the probe fails: a compiling driver cannot be stopped.
     fn find_device(&self, kind: GpuKind, plan: &DrawPlan<'_>) -> Result<Arc<dyn GpuDevice>, DrawError> {
         thread::scope(|scope| {
-            let making = Cell::new(None);
+            let making = RefCell::new(Vec::new());
             let found = self.host.device(kind, plan.samples, &|device| {
                 let device = device.clone();
                 // If this fails, drawing makes them again, and reports the error.
@@ -191,11 +191,15 @@ impl Backends {
                     let _ = catch_unwind(AssertUnwindSafe(|| device.make_ready(plan)));
                     drop_catching_panics(device);
                 };
-                making.set(thread::Builder::new().name("make-ready".into()).spawn_scoped(scope, make_ready).ok());
+                making
+                    .borrow_mut()
+                    .extend(thread::Builder::new().name("make-ready".into()).spawn_scoped(scope, make_ready));
             });
-            // Its panics are caught. A scope by itself does not wait for the very end of a thread, and drivers need that: see
+            // Their panics are caught. A scope by itself does not wait for the very end of a thread, and drivers need that: see
             // `DrawingThreads`.
-            let _ = making.take().map(thread::ScopedJoinHandle::join);
+            for thread in making.take() {
+                let _ = thread.join();
+            }
             found
         })
     }

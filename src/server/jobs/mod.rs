@@ -384,7 +384,8 @@ impl Jobs {
             std::thread::sleep(Duration::from_millis(2));
         }
         for worker in workers.drain(..).filter(JoinHandle::is_finished) {
-            // Its panic, if there was one, is in the log. Those that still run are detached: the process is about to end.
+            // Its panic, if there was one, is in the log. What is left of it is a call of the driver, which is short. Threads
+            // that still run are detached: the process is about to end.
             let _ = worker.join();
         }
     }

@@ -73,7 +73,7 @@ impl DrawingThreads {
     }
 }
 
-/// Waits for the threads' ends. A thread that has called a GPU's driver calls it once more at its very end. NVIDIA's
+/// Waits for the threads' ends. The driver of a GPU is called once more when a thread that has used it ends. NVIDIA's driver
 /// (580.159) waits for ever if the device is destroyed at that moment: one process in a hundred hung at its exit.
 impl Drop for DrawingThreads {
     fn drop(&mut self) {

@@ -91,7 +91,8 @@ impl FaceSizes {
     fn add<'a>(&mut self, view: &View<'_>, faces: impl Iterator<Item = &'a PickedFace>) {
         for picked in faces {
             if let Some([area, diameter]) = view.size_of(picked.face as usize) {
-                self.0[class_of(diameter)] += (area * f64::from(picked.weight) * 256.0).round() as u64;
+                let class = &mut self.0[class_of(diameter)];
+                *class = class.saturating_add((area * f64::from(picked.weight) * 256.0).round() as u64);
             }
         }
     }
