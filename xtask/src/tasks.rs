@@ -177,20 +177,42 @@ pub fn package(options: &[&str]) -> Result {
     PUBLISHED.iter().try_for_each(|name| look_into_archive(name, options))
 }
 
-/// Removes what cargo has unpacked of earlier archives. It takes them for those of now, because their version is the same.
+/// Removes what cargo has unpacked of earlier archives, and the marks by which it knows what it has built of them. It takes
+/// both for those of now, because their version is the same.
 fn forget_unpacked_archives() {
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| std::env::home_dir().map(|home| home.join(".cargo"))).unwrap_or_default();
-    let folders = |folder: &Path| std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let sources = home.join("registry/src");
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
     // Registries on disk have no host before the hyphen.
-    for registry in folders(&home.join("registry/src")).filter(|path| name(path).starts_with('-')) {
-        for archive in folders(&registry).filter(|path| name(path).starts_with("meshsnap")) {
-            if let Err(error) = std::fs::remove_dir_all(&archive) {
-                eprintln!("xtask: {} is out of date and cannot be removed: {error}", archive.display());
-            }
+    let unpacked = paths_in(&sources).filter(|path| name_of(path).starts_with('-')).flat_map(|path| paths_in(&path));
+    // What was built of a source lists its files in `deps/CRATE-HASH.d`; its mark is `.fingerprint/PACKAGE-HASH`.
+    let of_disk = format!("{}/-", sources.display());
+    let is_of_archive = |list: &PathBuf| {
+        let is_list = name_of(list).starts_with("meshsnap") && list.extension().is_some_and(|end| end == "d");
+        is_list && std::fs::read_to_string(list).is_ok_and(|text| text.contains(&of_disk))
+    };
+    let built = paths_in(&target.join("debug/deps")).filter(is_of_archive);
+    let marks = built.filter_map(|list| {
+        let (name, hash) =
+            name_of(&list).trim_end_matches(".d").rsplit_once('-').map(|(a, b)| (a.replace('_', "-"), b.to_owned()))?;
+        Some(target.join("debug/.fingerprint").join(format!("{name}-{hash}")))
+    });
+    let unpacked = unpacked.filter(|path| name_of(path).starts_with("meshsnap"));
+    for folder in unpacked.chain(marks.filter(|mark| mark.is_dir())) {
+        if let Err(error) = std::fs::remove_dir_all(&folder) {
+            eprintln!("xtask: {} is out of date and cannot be removed: {error}", folder.display());
         }
     }
+}
+
+/// What is in a folder; nothing if it cannot be read.
+fn paths_in(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
 /// Refuses an archive that is too large, or holds what only the repository needs.
