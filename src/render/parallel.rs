@@ -86,18 +86,20 @@ pub fn beside<R>(count: usize, work: impl FnOnce() + Clone + Send, meanwhile: im
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::cell::Cell;
+    use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::sync::mpsc::channel;
     use std::time::Duration;
 
     use super::*;
 
-    /// What a thread leaves to its very end, as drivers do.
-    struct AtTheEnd<'a>(&'a AtomicUsize);
+    /// Counts the end of the thread that owns it, late: as a thread-local value, it is dropped when all work is done. Drivers
+    /// are called at that time, too.
+    pub(crate) struct AtTheEnd(pub Arc<AtomicUsize>);
 
-    impl Drop for AtTheEnd<'_> {
+    impl Drop for AtTheEnd {
         fn drop(&mut self) {
             thread::sleep(Duration::from_millis(20));
             self.0.fetch_add(1, Ordering::Relaxed);
@@ -106,10 +108,11 @@ mod tests {
 
     #[test]
     fn threads_beside_have_ended_when_all_is_done() {
-        static ENDED: AtomicUsize = AtomicUsize::new(0);
-        thread_local!(static LEFT: Cell<Option<AtTheEnd<'static>>> = const { Cell::new(None) });
-        beside(4, || LEFT.set(Some(AtTheEnd(&ENDED))), || ());
-        assert_eq!(ENDED.load(Ordering::Relaxed), 4);
+        thread_local!(static LEFT: Cell<Option<AtTheEnd>> = const { Cell::new(None) });
+        let ended = Arc::new(AtomicUsize::new(0));
+        let own = ended.clone();
+        beside(4, move || LEFT.set(Some(AtTheEnd(own))), || ());
+        assert_eq!(ended.load(Ordering::Relaxed), 4);
     }
 
     #[test]

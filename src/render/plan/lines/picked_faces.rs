@@ -32,7 +32,7 @@ pub struct PickedFace {
 
 /// The faces of a mesh that are looked at, in order: all, or on average so many as [`BY_AREA`] and [`BY_NUMBER`] say.
 ///
-/// What decides about a face is a hash of the places of its corners, in steps. Order of corners and faces, scale, mirroring
+/// A hash of the places of its corners, in steps, decides whether a face is picked. Order of corners and faces, scale, mirroring
 /// and turns by right angles change nothing, but for the few places that rounding moves past a step. Faces that are mirror
 /// images of each other, or lie within one step, are picked together.
 pub fn picked_faces(mesh: &Mesh, budget: &mut Budget) -> Result<Vec<PickedFace>, LimitExceeded> {
@@ -72,7 +72,7 @@ pub fn picked_faces(mesh: &Mesh, budget: &mut Budget) -> Result<Vec<PickedFace>,
 /// Bits of a word.
 const WORD: usize = u64::BITS as usize;
 
-/// What decides which faces are picked.
+/// The dice that decide which faces are picked.
 struct Dice {
     /// The middle of the mesh's box, and steps of places per unit.
     middle: [f32; 3],
@@ -109,7 +109,7 @@ impl Dice {
         f64::from(self.throw(mesh, face)) < self.probability(mesh, face) * f64::from(u32::MAX)
     }
 
-    /// How many faces a picked one stands for.
+    /// The number of faces that a picked one stands for.
     fn weight(&self, mesh: &Mesh, face: usize) -> f32 {
         (1.0 / self.probability(mesh, face)).max(1.0) as f32
     }

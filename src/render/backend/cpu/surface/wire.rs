@@ -51,7 +51,7 @@ pub fn wire_covers<const N: usize>(
     covers
 }
 
-/// How much a wire covers each point, 0 to 1: one less the smallest smoothstep of the coordinates of drawn edges, each
+/// Coverage of each point by a wire, 0 to 1: one less the smallest smoothstep of the coordinates of drawn edges, each
 /// by its own exact width. `masks` say which edges of each point's triangle are drawn.
 #[inline(always)]
 pub fn fwidth_covers<const N: usize>(masks: &[u8; N], material: &ShadedMaterial, b: &Barycentrics<N>) -> [f32; N] {
