@@ -86,7 +86,7 @@ pub fn beside<R>(count: usize, work: impl FnOnce() + Clone + Send, meanwhile: im
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use std::cell::Cell;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
@@ -97,7 +97,7 @@ pub(crate) mod tests {
 
     /// Counts the end of the thread that owns it, late: as a thread-local value, it is dropped when all work is done. Drivers
     /// are called at that time, too.
-    pub(crate) struct AtTheEnd(pub Arc<AtomicUsize>);
+    struct AtTheEnd(Arc<AtomicUsize>);
 
     impl Drop for AtTheEnd {
         fn drop(&mut self) {

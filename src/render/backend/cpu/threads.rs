@@ -136,9 +136,9 @@ pub fn map<T: Send, U: Send>(pool: Option<&ThreadPool>, items: Vec<T>, each: imp
 mod tests {
     use std::cell::Cell;
     use std::sync::{Arc, mpsc};
+    use std::time::Duration;
 
     use super::*;
-    use crate::parallel::tests::AtTheEnd;
 
     #[test]
     fn pictures_at_once_divide_the_threads() {
@@ -154,6 +154,16 @@ mod tests {
         assert_eq!(threads.share().count, 4, "what has ended counts no more");
         let one = DrawingThreads::new(1);
         assert_eq!((one.share().count, one.share().pool().is_some()), (1, false));
+    }
+
+    /// Counts the very end of a thread, when its thread-local values are dropped.
+    struct AtTheEnd(Arc<AtomicUsize>);
+
+    impl Drop for AtTheEnd {
+        fn drop(&mut self) {
+            thread::sleep(Duration::from_millis(20));
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
     }
 
     #[test]

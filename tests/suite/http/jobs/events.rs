@@ -24,9 +24,27 @@ fn events(text: &[u8]) -> Vec<Event> {
 }
 
 fn submit(server: &Server, query: &str) -> String {
-    let accepted = server.post(&format!("/v1/jobs?{query}"), CUBE_OBJ);
+    accepted(server, query, CUBE_OBJ)
+}
+
+/// The address of a job for a mesh.
+fn accepted(server: &Server, query: &str, mesh: &[u8]) -> String {
+    let accepted = server.post(&format!("/v1/jobs?{query}"), mesh);
     assert_eq!(accepted.status, 202, "{}", String::from_utf8_lossy(&accepted.body));
     accepted.header("location").unwrap().to_owned()
+}
+
+/// Cubes one in another: an x-ray picture of them has twice as many layers.
+fn nested_cubes(count: usize) -> Vec<u8> {
+    let cube = |number: usize| {
+        let a = 1.0 - number as f32 / (2 * count) as f32;
+        format!(
+            "v -{a} -{a} -{a}\nv {a} -{a} -{a}\nv {a} {a} -{a}\nv -{a} {a} -{a}\nv -{a} -{a} {a}\nv {a} -{a} {a}\n\
+             v {a} {a} {a}\nv -{a} {a} {a}\nf -8 -5 -6 -7\nf -4 -3 -2 -1\nf -8 -7 -3 -4\nf -7 -6 -2 -3\n\
+             f -6 -5 -1 -2\nf -5 -8 -4 -1\n"
+        )
+    };
+    (0..count).map(cube).collect::<String>().into_bytes()
 }
 
 /// Reads a stream to its end.
@@ -126,7 +144,8 @@ fn failed_and_cancelled_jobs_end_their_streams() {
 #[test]
 fn streams_are_few_and_one_that_goes_away_frees_its_place() {
     let server = Server::start(&["--workers", "1"]);
-    let blockers = [0; 24].map(|_| submit(&server, "size=4096&samples=16"));
+    // Each of them takes the worker until its deadline of 30 s, or until it is cancelled.
+    let blockers = [0; 4].map(|_| accepted(&server, "size=4096&samples=16&style=xray", &nested_cubes(120)));
     let job = submit(&server, "size=64");
     let mut streams: Vec<TcpStream> = (0..32).map(|_| follow(&server, &job)).collect();
     let full = server.get(&format!("{job}/events"));
