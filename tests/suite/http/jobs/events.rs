@@ -24,14 +24,21 @@ fn events(text: &[u8]) -> Vec<Event> {
 }
 
 fn submit(server: &Server, query: &str) -> String {
-    accepted(server, query, CUBE_OBJ)
+    submit_mesh(server, query, CUBE_OBJ)
 }
 
-/// The address of a job for a mesh.
-fn accepted(server: &Server, query: &str, mesh: &[u8]) -> String {
+fn submit_mesh(server: &Server, query: &str, mesh: &[u8]) -> String {
     let accepted = server.post(&format!("/v1/jobs?{query}"), mesh);
     assert_eq!(accepted.status, 202, "{}", String::from_utf8_lossy(&accepted.body));
     accepted.header("location").unwrap().to_owned()
+}
+
+/// A job that has the only worker until its deadline of 30 s, or until it is cancelled. A short job that came before the
+/// worker had begun would overtake it.
+fn occupy(server: &Server) -> String {
+    let job = submit_mesh(server, "size=4096&samples=16&style=xray", &nested_cubes(120));
+    server.wait_for_load(|load| load["running"] == 1);
+    job
 }
 
 /// Cubes one in another: an x-ray picture of them has twice as many layers.
@@ -126,7 +133,7 @@ fn failed_and_cancelled_jobs_end_their_streams() {
         (name.as_str(), id.as_str(), data["error"]["code"].as_str()),
         ("failed", "failed", Some("mesh_unrecognised"))
     );
-    let blocker = submit(&server, "size=4096&samples=16");
+    let blocker = occupy(&server);
     let job = submit(&server, "size=64");
     let mut stream = follow(&server, &job);
     server.request("DELETE", &job, &[], b"");
@@ -144,8 +151,7 @@ fn failed_and_cancelled_jobs_end_their_streams() {
 #[test]
 fn streams_are_few_and_one_that_goes_away_frees_its_place() {
     let server = Server::start(&["--workers", "1"]);
-    // Each of them takes the worker until its deadline of 30 s, or until it is cancelled.
-    let blockers = [0; 4].map(|_| accepted(&server, "size=4096&samples=16&style=xray", &nested_cubes(120)));
+    let blocker = occupy(&server);
     let job = submit(&server, "size=64");
     let mut streams: Vec<TcpStream> = (0..32).map(|_| follow(&server, &job)).collect();
     let full = server.get(&format!("{job}/events"));
@@ -164,9 +170,7 @@ fn streams_are_few_and_one_that_goes_away_frees_its_place() {
         }
         assert!(began.elapsed() < PATIENCE, "no place is free");
     }
-    for job in &blockers {
-        server.request("DELETE", job, &[], b"");
-    }
+    server.request("DELETE", &blocker, &[], b"");
 }
 
 #[test]
