@@ -1,5 +1,5 @@
-// Every stage: the uniforms' types, shared constants, and arithmetic that gives the CPU's bits
-// (docs/rasterizer.md, "Rounded operations").
+// The definitions that shaders share: the types of the uniforms, constants, the positions of samples in a pixel,
+// and arithmetic that gives the same bits as the CPU's (docs/rasterizer.md, "Rounded operations").
 //
 // Uses: one_job.wgsl or gang.wgsl (batch, frame).
 

@@ -1,5 +1,5 @@
-// Stage resolve: a colour as sRGB bytes. Shared by resolve.wgsl and paint.wgsl. The CPU's is in
-// src/render/backend/cpu/resolve.rs.
+// The conversion of a pixel's colour from linear light to the sRGB bytes of the picture (stage resolve). Used by
+// resolve.wgsl and paint.wgsl. The CPU's counterpart is in src/render/backend/cpu/resolve.rs.
 //
 // Uses: common.wgsl (recip, rn, rn3).
 

@@ -1,5 +1,6 @@
-// The uniforms of kernels that draw for a gang: up to JOBS_MAX jobs in one dispatch, whose workgroups tell
-// them apart by their third coordinate. src/render/backend/gpu/gang/ explains gangs.
+// The uniforms of kernels that draw for a gang: up to JOBS_MAX jobs (one picture each) that share one dispatch. The
+// third coordinate of a workgroup is the number of its job. Kernels that draw for a single job have one_job.wgsl
+// instead. src/render/backend/gpu/gang/ explains gangs.
 //
 // Uses: common.wgsl (Batch, Frame, JOBS_MAX).
 

@@ -1,4 +1,5 @@
-// The uniforms of kernels that draw for one job.
+// The uniforms of kernels that draw for a single job (one picture) per dispatch: `frame`, those of the picture, and
+// `batch`, those of the dispatch. Kernels that several jobs share have gang.wgsl instead, with the same names.
 //
 // Uses: common.wgsl (Batch, Frame).
 

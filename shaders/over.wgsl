@@ -1,4 +1,5 @@
-// Stages lines and resolve: compositing over the background. The CPU's is in
+// The background behind a pixel, and the compositing of a pixel's colour over it (stages lines and resolve). The
+// sign of the colour's alpha tells whether the background is already part of it. The CPU's counterpart is in
 // src/render/backend/cpu/resolve.rs.
 //
 // Uses: common.wgsl (rn4), one_job.wgsl or gang.wgsl (batch, frame).

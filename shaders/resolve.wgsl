@@ -1,5 +1,5 @@
-// Stage resolve, per pixel: blends the background into the colour, unless lines have done so, and
-// converts it to sRGB bytes. Twin of src/render/backend/cpu/resolve.rs.
+// Stage resolve, the last one, per pixel: the background is laid under the pixel's colour, unless the stage lines
+// has done so, and the result is converted to sRGB bytes. Twin of src/render/backend/cpu/resolve.rs.
 //
 // Uses: common.wgsl (has, HULL, LINES, SURFACE, WORKGROUP), one_job.wgsl or gang.wgsl (batch,
 // begin_job, frame), encode.wgsl (encode, rgba), over.wgsl (background_at, flip_alpha_sign,

@@ -1,4 +1,6 @@
-// Stage visibility: a triangle of the plan by its number.
+// The three corners of a triangle on screen, given the triangle's number, and the test whether one of them is
+// behind the near plane or too far outside the picture. Such a triangle has to be clipped before it is drawn (stage
+// visibility).
 //
 // Uses: common.wgsl (OUTSIDE, Vertex), one_job.wgsl or gang.wgsl (frame).
 

@@ -1,5 +1,6 @@
-// Stage transform: clipping in homogeneous coordinates, shared by triangles (clip.wgsl) and edges
-// (edge.wgsl).
+// The planes of clipping in homogeneous coordinates, which are the near plane and four planes far outside the
+// picture: the distance of a point from a plane, and the point where a line between two points crosses it. Shared
+// by the clipping of triangles (clip.wgsl) and that of edges (lines/segment.wgsl).
 //
 // Uses: common.wgsl (recip, rn, round_to_i32, Vertex), one_job.wgsl (frame).
 

@@ -1,4 +1,5 @@
-// Stage visibility, per small triangle: the samples that it covers, and its depth at each.
+// The drawing of a small triangle by a single thread (stage visibility). For all pixels of the triangle's bounding
+// box it finds the samples that the triangle covers, and the triangle's depth at each. Used by visibility.wgsl.
 //
 // Uses: common.wgsl (sample_corner, sample_count, sample_step), geometry/triangle.wgsl (depth_at,
 // edges_of, Setup), peeling/emit_layer.wgsl or samples/emit.wgsl (emit).

@@ -1,5 +1,7 @@
-// Comparisons of depths: the tolerance for rounding, and the slope of a triangle's depth on screen,
-// from its corners times their W. Twin of src/render/backend/cpu/geometry/steepness.rs.
+// Arithmetic on the depths of triangles on screen, by which other files find out what lies in front of a line: the
+// tolerance for rounding, the slope of a triangle's depth, and where a point lies relative to a triangle's sides.
+// Corners are homogeneous: x, y and depth, each times W, and W. Twin of
+// src/render/backend/cpu/geometry/steepness.rs.
 //
 // Uses: common.wgsl (recip, rn, rn2, rn3).
 

@@ -1,7 +1,10 @@
-// Stage visibility, per tile of 64 x 64 pixels of a triangle that a workgroup draws: first each thread tests a
-// block of 8 x 8 pixels against the edges, then all threads together fill the blocks that are left, one thread per
-// pixel. Shared by visibility_tile.wgsl and visibility_few.wgsl. What a pixel's thread does is in tile_samples.wgsl
-// or, for mixed pixels, in mixed/lists.wgsl. No twin: the CPU has one loop for all sizes.
+// The drawing of a triangle by a whole workgroup, in tiles of 64 x 64 pixels (stage visibility). First each thread
+// tests a block of 8 x 8 pixels against the triangle's edges. Then all threads together go through the blocks that
+// are not empty, one thread per pixel. Shared by visibility_tile.wgsl and visibility_few.wgsl.
+//
+// What a thread does in its pixel is in tile_samples.wgsl or, for mixed pixels (which are drawn again from many
+// points), in mixed/lists.wgsl or mixed/points.wgsl. No twin: on the CPU, threads do not share a triangle's pixels
+// like this.
 //
 // Uses: common.wgsl (mul_wide, sub_wide, WORKGROUP), geometry/tile_samples.wgsl or mixed/lists.wgsl
 // or mixed/points.wgsl (block_corner, draw_pixel), geometry/triangle.wgsl (Edges, edges_of,

@@ -1,4 +1,5 @@
-// Stage visibility, per pixel of a tile: the samples that a triangle covers, and its depth at each.
+// The work of one thread in one pixel of a tile (tile.wgsl draws triangles in tiles of 64 x 64 pixels): the samples
+// of the pixel that the triangle covers, and its depth at each (stage visibility).
 //
 // Uses: common.wgsl (sample_corner, sample_count, sample_step), geometry/triangle.wgsl (depth_at,
 // Edges, Setup), peeling/emit_layer.wgsl or samples/emit.wgsl (emit).

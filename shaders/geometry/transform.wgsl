@@ -1,8 +1,8 @@
-// Stage transform, per vertex: unit box to snapped screen coordinates. Twin of
-// src/render/backend/cpu/geometry/transform.rs.
+// Stage transform, per vertex: from its position in the mesh's unit box to coordinates on screen, snapped to 1/256
+// px. Twin of src/render/backend/cpu/geometry/transform.rs.
 //
-// It also empties the first band's visibility buffer and the first work list: separate commands would be slower than
-// these stores.
+// The same kernel empties two buffers: the visibility buffer for the first band of rows of the picture, and the
+// work list (triangles that are too large for one thread). Separate commands would be slower than these stores.
 //
 // Uses: common.wgsl (homogeneous, OUTSIDE, recip, rn, round_to_i32, Vertex, WORKGROUP),
 // one_job.wgsl or gang.wgsl (batch, begin_job, frame, job).

@@ -1,5 +1,6 @@
-// Stage visibility where there are few triangles: the workgroups of each draw its tiles, whatever its size, so that
-// no work list is needed. No twin: the CPU has one loop for all sizes.
+// Stage visibility for a dispatch of few triangles: each triangle has one or more workgroups of its own, which draw
+// it in tiles of 64 x 64 pixels, whatever its size. So no list of large triangles is needed. No twin: on the CPU,
+// threads do not share a triangle's pixels like this.
 //
 // Uses: common.wgsl (WORKGROUP), one_job.wgsl or gang.wgsl (batch, begin_job),
 // geometry/corners.wgsl (is_outside, screen_triangle), geometry/culling.wgsl (passes_culling),

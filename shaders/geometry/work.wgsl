@@ -1,4 +1,6 @@
-// Stage visibility: the list of large triangles that visibility_tile.wgsl draws, and how others append to it.
+// The work list (stage visibility): triangles that are too large to be drawn by one thread, and the pieces that
+// clipping has left of triangles. visibility.wgsl and clip.wgsl append to it with the function here, and
+// visibility_tile.wgsl draws its items.
 //
 // Uses: common.wgsl (ITEM_VECTORS, JOBS_MAX), one_job.wgsl or gang.wgsl (batch, frame, job),
 // geometry/triangle.wgsl (Setup).

@@ -1,8 +1,9 @@
-// Stage lines, per piece of an edge: hidden-line removal, which finds the intervals that no
-// triangle hides. Twin of src/render/backend/cpu/lines/hidden_lines.rs; edge.wgsl declares the buffers.
+// Hidden-line removal (stage lines): the intervals along a part of an edge in which no triangle hides the edge.
+// Twin of src/render/backend/cpu/lines/hidden_lines.rs; edge.wgsl declares the buffers.
 //
-// The threads of a workgroup find the triangles and their intervals together. The CPU sorts the
-// intervals; here they are walked through in order.
+// All threads of a workgroup together find the triangles along the edge and the interval that each of them hides.
+// The CPU sorts these intervals. Here they stay unsorted, and all are looked through again for each visible part,
+// from one end of the edge to the other.
 //
 // Uses: common.wgsl (CLIPPED, has, OUTSIDE, recip, rn, rn3, sample_count, Vertex), one_job.wgsl
 // (batch, frame), geometry/planes.wgsl (is_moderate), geometry/steepness.wgsl (is_far,

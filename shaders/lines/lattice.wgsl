@@ -1,5 +1,7 @@
-// Stage lines: where the points of a pixel lie. No twin: the CPU's are LATTICE in
-// src/render/backend/cpu/lines/stroke.rs.
+// The 256 points of a pixel at which it is tested what a line covers (stage lines), a rank-1 lattice in units of
+// 1/65536 px that is computed rather than stored. Also the unit, 1/16384 px, in which a point's distances along
+// and across a line are compared with the line's borders. The CPU has the points as a table, LATTICE in
+// src/render/backend/cpu/lines/stroke.rs, so this file has no twin.
 //
 // Uses: common.wgsl (round_to_i32), lines/stroke_words.wgsl (GENERATOR, POINTS).
 

@@ -1,8 +1,8 @@
-// Stage lines, per pixel: the light on lines that are lit like the surface. Twin of
+// The light on lines that are lit like the surface, per pixel (stage lines). Twin of
 // src/render/backend/cpu/lines/line_light.rs.
 //
-// Light changes a colour by a factor and a summand. Both are the means over the samples that show
-// the surface. If no sample does, they are those of the light on the line's own face.
+// Light changes a colour by a factor and a summand. For each pixel both are the means over the samples that show
+// the surface. If no sample does, they are those of the light on a face beside the line's edge.
 //
 // Uses: common.wgsl (first_visibility_sample, pixel_corner, sample_count, sample_offset,
 // WORKGROUP), one_job.wgsl (batch, frame), surface/barycentric.wgsl (barycentrics),

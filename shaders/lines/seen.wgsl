@@ -1,5 +1,5 @@
-// Stage lines: what the visibility buffer shows. The CPU's is SampleBand in
-// src/render/backend/cpu/geometry/samples.rs.
+// Access to the visibility buffer for stage lines: the nearest triangle at a sample of a pixel, and its depth. The
+// CPU's counterpart is SampleBand in src/render/backend/cpu/geometry/samples.rs.
 //
 // Uses: common.wgsl (sample_count), one_job.wgsl (batch, frame), lines/coverage.wgsl or
 // lines/edge.wgsl or lines/holes/holes.wgsl or lines/holes/tips.wgsl (samples).

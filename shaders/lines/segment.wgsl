@@ -1,5 +1,6 @@
-// Stage lines, per edge: the edge's ends on screen, and the walk over the pixels along it. Twin of
-// src/render/backend/cpu/lines/segment.rs. edge.wgsl declares the buffers.
+// An edge on screen, as a straight segment (stage lines): its two ends, clipped where necessary, its points and
+// their depths, and the walk over the pixels along it. Twin of src/render/backend/cpu/lines/segment.rs. edge.wgsl
+// declares the buffers.
 //
 // Uses: common.wgsl (CLIPPED, has, homogeneous, OUTSIDE, rn, rn2, rsqrt, Vertex), one_job.wgsl
 // (batch, frame), geometry/planes.wgsl (intersect, is_moderate, plane_distance, snap_clipped),

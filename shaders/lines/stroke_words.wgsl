@@ -1,5 +1,7 @@
-// The lines stage's buffer of strokes, as edge.wgsl adds to it and coverage.wgsl reads it. No twin:
-// the CPU's is a struct, LineCoverage in src/render/backend/cpu/lines/coverage.rs.
+// The layout of the buffer `strokes` (stage lines): 13 words per pixel about its strokes (a stroke is the area
+// that the line of one edge covers) and about the area that lines leave free. edge.wgsl and the files in holes/
+// write them, and coverage.wgsl reads them. The CPU has a struct, LineCoverage in
+// src/render/backend/cpu/lines/coverage.rs, so this file has no twin.
 //
 // Uses: common.wgsl (sample_count).
 

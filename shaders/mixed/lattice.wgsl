@@ -1,4 +1,7 @@
-// Stage mixed: the coverage points of a pixel. Twin of src/render/backend/cpu/mixed/points.rs.
+// The 256 points from which a mixed pixel is drawn again because different colours meet there (stage mixed). They
+// form a rank-1 lattice, which is computed rather than stored. Where the colours differ little, every fourth point
+// is enough. Also the depth of a triangle at a point that it covers. Twin of
+// src/render/backend/cpu/mixed/points.rs.
 //
 // Uses: common.wgsl (rn, rn2).
 

@@ -1,5 +1,7 @@
-// Stage mixed, per triangle and mixed pixel: lists of the triangles that each pixel may show. Twin of
-// src/render/backend/cpu/mixed/lists.rs. Items of a list are in no order; nothing depends on it.
+// Lists of triangles, one list per mixed pixel (stage mixed). Mixed pixels are drawn again, from 64 or 256 points
+// each, because different colours meet there. A triangle is put into the list of each mixed pixel that it may
+// touch. mixed_parts.wgsl then reads the lists. Their order varies from run to run, but nothing depends on it.
+// Twin of src/render/backend/cpu/mixed/lists.rs.
 //
 // Uses: common.wgsl (pixel_corner), one_job.wgsl (batch, frame), geometry/triangle.wgsl (Edges,
 // edges_of, Setup), mixed/place.wgsl (FEW, item_at, ITEM_COUNT, list_at, number_at, OVERFLOW),

@@ -1,6 +1,10 @@
-// Stage mixed, per mixed pixel whose points are in memory: sums the colours of the triangles that its points see, each
-// weighed by its share of them. Twin of
-// src/render/backend/cpu/mixed/color.rs. Pixels that have lists of triangles go through mixed_parts.wgsl instead.
+// The colours of mixed pixels (stage mixed). Mixed pixels are drawn again, from 64 or 256 points each, because
+// different colours meet there. The buffer `points` holds, for each point, the triangle that is visible at it. The
+// colours of these triangles are added up, each weighted by its share of the points. Twin of
+// src/render/backend/cpu/mixed/color.rs.
+//
+// Used for pictures in linear light, and if the buffer is too small for a picture's lists of triangles
+// (lists.wgsl). Otherwise mixed_parts.wgsl, mixed_shade.wgsl and mixed_sum.wgsl do this work.
 //
 // Uses: common.wgsl (has, LINES, WORKGROUP), one_job.wgsl (batch), mixed/lattice.wgsl (FEW_STEP,
 // POINTS), mixed/place.wgsl (border_at, BORDER_WORDS, FEW, pixel_at), mixed/share_color.wgsl

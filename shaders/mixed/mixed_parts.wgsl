@@ -1,6 +1,10 @@
-// Stage mixed, per mixed pixel: the triangle of its list that each point sees, and so the parts that its colour is the
-// sum of. Twin of src/render/backend/cpu/mixed/color.rs and faces.rs. The parts' colours: mixed_shade.wgsl; their sum:
-// mixed_sum.wgsl.
+// The parts of each mixed pixel (stage mixed). Mixed pixels are drawn again, from 64 or 256 points each, because
+// different colours meet there. A part is a triangle that is visible at some of the points, with its share of the
+// points and their mean position. (A triangle of a metal that mirrors sharply may be a part in each quarter of the
+// pixel.) To find the parts, the nearest triangle at each point is chosen from the pixel's list of triangles
+// (lists.wgsl). Twin of src/render/backend/cpu/mixed/color.rs and faces.rs.
+//
+// mixed_shade.wgsl then computes the parts' colours, and mixed_sum.wgsl adds them up.
 //
 // Uses: common.wgsl (CLIPPED, has, LINES, WORKGROUP), one_job.wgsl (batch), mixed/lattice.wgsl
 // (depth_at_point, FEW_STEP, POINTS, PointTriangle, Share), mixed/place.wgsl (border_at,

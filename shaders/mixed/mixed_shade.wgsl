@@ -1,5 +1,7 @@
-// Stage mixed, per part of a mixed pixel: what a triangle adds to the pixel's colour. Twin of
-// src/render/backend/cpu/surface/waiting.rs.
+// The colour of each part of a mixed pixel (stage mixed). Mixed pixels are drawn again, from 64 or 256 points
+// each, because different colours meet there. A part is a triangle that is visible at some of the points; its
+// colour is weighted by its share of the points. mixed_parts.wgsl has found the parts, and mixed_sum.wgsl adds
+// their colours up. Twin of src/render/backend/cpu/surface/waiting.rs.
 //
 // Uses: common.wgsl (WORKGROUP), mixed/lattice.wgsl (Share), mixed/place.wgsl (OVERFLOW, part_at,
 // PART_COUNT), mixed/share_color.wgsl (share_color).

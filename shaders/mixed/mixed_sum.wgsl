@@ -1,4 +1,7 @@
-// Stage mixed, per mixed pixel: its colour, the sum of its parts.
+// The last step for mixed pixels (stage mixed), which are drawn again from 64 or 256 points because different
+// colours meet there. Each triangle visible at some of the points is a part (sometimes one in each quarter of the
+// pixel). mixed_shade.wgsl has computed the parts' colours, already weighted by their shares of the points; this
+// adds them up, in the CPU's order, and writes the pixel's colour.
 //
 // Uses: common.wgsl (WORKGROUP), mixed/place.wgsl (FEW, part_at, parts_at, PARTS_OF_PIXEL,
 // pixel_at).

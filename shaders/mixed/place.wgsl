@@ -1,14 +1,21 @@
-// Stage mixed: the buffer of a band's mixed pixels. The CPU's is MixedPixels in src/render/backend/cpu/mixed/find/pixels.rs.
+// The layout of the buffer `mixed` (stage mixed). It says which pixels of a band of rows are mixed, and what is
+// known of each. Mixed pixels are drawn again, from 64 or 256 points each, because different colours meet there.
+// The CPU's counterpart is MixedPixels in src/render/backend/cpu/mixed/find/pixels.rs.
 //
-// Its words:
-// - their number; 1 if there was no room for all lists; and the numbers of items of lists and of parts
-// - by pixel of the band: 1 more than its number among them, or 0; with FEW where few points are enough
-// - by number: the pixel, with FEW likewise
-// - by pixel, and one more on each side: the places where colours break off
-// - by number: the first item of the pixel's list of triangles, or LIST_END
-// - by number: the first of the pixel's parts, times PARTS_OF_PIXEL, and how many they are
-// - by number, where lines are drawn: the points that see something, as stroke.wgsl numbers them; none where all do, or
-//   few points were enough
+// Mixed pixels are numbered from 0. The words of the buffer are, one group after the other:
+// - 4 words: the number of mixed pixels; 1 if there was no room for all lists or parts, else 0; the number of
+//   items of all lists; the number of all parts
+// - for each pixel of the band: 0 if it is not mixed, else 1 more than its number; with the bit FEW where 64 of
+//   its 256 points are enough
+// - for each mixed pixel, by number: its index in the band, with FEW likewise
+// - for each pixel of the band, and of a border of one pixel around it: bits for its colour breaks, places where
+//   the colour differs clearly (find/seen_faces.wgsl)
+// - for each mixed pixel: the first item of its list of triangles, or LIST_END
+// - for each mixed pixel: its first part (a triangle that is visible at some of its points), times PARTS_OF_PIXEL,
+//   plus the number of its parts
+// - for each mixed pixel, where lines are drawn: a bit for each point at which something is visible, in the order
+//   in which lines/stroke.wgsl numbers points; no bits if something is visible at all points, or if 64 points were
+//   enough
 //
 // Uses: one_job.wgsl (batch, frame).
 

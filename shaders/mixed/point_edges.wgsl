@@ -1,4 +1,6 @@
-// Stage mixed: edge functions at the points of a pixel.
+// The edge functions of a triangle in a mixed pixel, which is drawn again from 64 or 256 points because different
+// colours meet there (stage mixed): their values at the pixel's first point, and the test whether all points lie
+// outside of one edge, so that the triangle need not be looked at in this pixel.
 //
 // Uses: common.wgsl (mul_wide, sub_wide), geometry/triangle.wgsl (Edges, Setup).
 

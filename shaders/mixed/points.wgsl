@@ -1,4 +1,7 @@
-// Stage mixed, per triangle and mixed pixel: the points that the triangle covers, and its depth at each. Twin of
+// The drawing of a triangle into the points of mixed pixels (stage mixed). Mixed pixels are drawn again, from 64
+// or 256 points each, because different colours meet there. At each point that the triangle covers its depth is
+// computed, and memory keeps the nearest triangle of each point. Used for pictures in linear light, and if the
+// buffer is too small for a picture's lists of triangles (lists.wgsl). Twin of
 // src/render/backend/cpu/mixed/triangle/mod.rs.
 //
 // Uses: common.wgsl (pixel_corner), one_job.wgsl (batch, frame), geometry/triangle.wgsl (Edges,

@@ -1,4 +1,7 @@
-// Stage mixed, per triangle in a mixed pixel: its colour.
+// The colour that one triangle adds to a mixed pixel (stage mixed). Mixed pixels are drawn again, from 64 or 256
+// points each, because different colours meet there. The triangle is shaded at the mean position of the points at
+// which it is visible, and its colour is weighted by their share of all points. Used by mixed_shade.wgsl and
+// mixed_color.wgsl.
 //
 // Uses: common.wgsl (first_visibility_sample, has, OCCLUSION, pixel_corner, rn4, SURFACE),
 // one_job.wgsl (batch, frame), mixed/lattice.wgsl (Share), occlusion/spread.wgsl (open_share),

@@ -1,4 +1,7 @@
-// Stage mixed, per pixel that a workgroup works on: the share of its points that each triangle has. Twin of
+// The share of each visible triangle in a mixed pixel (stage mixed): at how many of the pixel's points it is
+// visible, and the mean position of these points. Mixed pixels are drawn again, from 64 or 256 points each,
+// because different colours meet there. A workgroup works on one pixel at a time. All points are gone through for
+// each triangle; point_sets.wgsl is the quicker way for pixels of few triangles. Twin of
 // src/render/backend/cpu/mixed/shares.rs.
 //
 // Uses: common.wgsl (recip, rn2, WORKGROUP), mixed/lattice.wgsl (FEW_FIRST, FEW_STEP, point_place,

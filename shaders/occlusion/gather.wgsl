@@ -1,5 +1,7 @@
-// Stage occlusion, per pixel of every second column and row: looks at places around it and adds up how much light
-// each blocks. Twin of src/render/backend/cpu/occlusion/gather.rs.
+// Screen-space ambient occlusion at half resolution (stage occlusion, which darkens hollows): the light that the
+// surface around a pixel blocks. It is computed for the pixels of every second column and row: 16 places around
+// the pixel are looked at, and what each of them blocks is added up. Twin of
+// src/render/backend/cpu/occlusion/gather.rs.
 //
 // Uses: common.wgsl (dot3, pixel_corner, quick_rsqrt, rn, rn2, rn3, round_to_i32, sample_offset,
 // WORKGROUP), one_job.wgsl or gang.wgsl (batch, begin_job, frame), occlusion/place.wgsl

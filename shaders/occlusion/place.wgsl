@@ -1,5 +1,7 @@
-// Stage occlusion: the place of a sample is its distance from the far plane towards the viewer, in pixels. The CPU's
-// are in src/render/backend/cpu/occlusion/grid.rs.
+// Linear depth (stage occlusion, which darkens hollows): from a value of the depth buffer to the distance from the
+// far plane towards the viewer. The unit is a pixel (at the mesh's centre), as across the screen, so that
+// distances can be measured in space. The CPU's counterpart is `place_of` in
+// src/render/backend/cpu/occlusion/grid.rs.
 //
 // Uses: common.wgsl (recip, rn), one_job.wgsl or gang.wgsl (frame).
 

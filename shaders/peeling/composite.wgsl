@@ -1,5 +1,7 @@
-// Stage shade, per pixel: composites a peeled layer's colours under those of the layers in front of
-// it. Twin of src/render/backend/cpu/peeling/composite.rs.
+// The compositing of a layer's colours, per pixel (stage shade). Layers are what depth peeling finds of transparent
+// surfaces, from front to back: in each round, for each sample, the nearest triangle behind the last round's. The
+// new layer's colours go under those of the layers in front of it. Twin of
+// src/render/backend/cpu/peeling/composite.rs.
 //
 // Uses: common.wgsl (CLIPPED, has, homogeneous, OUTSIDE, PEELED_HULL, rn4, sample_count,
 // WIRES_ONLY, WORKGROUP), one_job.wgsl (batch, frame), geometry/steepness.wgsl (is_far, steepness),

@@ -1,4 +1,6 @@
-// Stage visibility: whether depth peeling goes on. No twin: the CPU ends its loop over the rounds.
+// The test whether depth peeling is done: whether the previous round, which looked for the next layer of
+// transparent triangles, has left nothing to find (stage visibility). No twin: the CPU ends its loop over the
+// rounds.
 //
 // Uses: common.wgsl (has, PEELING), one_job.wgsl (batch).
 

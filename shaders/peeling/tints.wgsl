@@ -1,7 +1,10 @@
-// Stage shade, per pixel: the places where composite.wgsl keeps what layers add to a pixel, and
-// coverage.wgsl finds it. Twin of src/render/backend/cpu/peeling/tints.rs. Both declare `colors`, which
-// holds, for all pixels of the band each: colours, the light on lines, the colour that each layer
-// adds, the layers' depths, and their steepness.
+// The indices in the buffer `colors` at which composite.wgsl keeps the colours and depths of transparent layers,
+// per pixel (stage shade). coverage.wgsl reads them to tint the lines that lie behind these layers. Twin of
+// src/render/backend/cpu/peeling/tints.rs.
+//
+// Both kernels declare `colors`. It holds five things one after the other, each for all pixels of the band of rows
+// that is being drawn: the colours, the light on lines, the colour that each layer adds, the layers' depths, and
+// their steepness (the slope of the depth on screen).
 //
 // Uses: common.wgsl (has, LINES), one_job.wgsl (batch, frame).
 

@@ -1,4 +1,5 @@
-// Stage visibility, per sample: writes to the visibility buffer.
+// A sample of the visibility buffer (stage visibility): of the triangles that are offered to it, it keeps the
+// nearest. peeling/emit_layer.wgsl takes the place of this file where layers of transparent triangles are drawn.
 //
 // Uses: one_job.wgsl or gang.wgsl (batch), samples/samples.wgsl (sample_index),
 // samples/samples32.wgsl or samples/samples64.wgsl (keep_nearest).

@@ -1,4 +1,5 @@
-// Stage visibility, per sample: index of its word, row by row, a pixel's samples together.
+// The index of a sample in the visibility buffer or in a layer of depth peeling (stage visibility): pixels lie row
+// by row, the samples of a pixel together.
 //
 // Uses: common.wgsl (sample_count), one_job.wgsl or gang.wgsl (batch).
 

@@ -1,6 +1,6 @@
-// Stage visibility, per sample, without 64-bit atomics, in two phases over all triangles: first the
-// nearest depth, then, where a triangle computes just that depth again, the lowest id. The memory
-// is the same as with 64 bits: low word, high word.
+// The nearest triangle of a sample, kept without 64-bit atomics (stage visibility). This takes two phases, each
+// over all triangles: first the nearest depth is found, then, where a triangle computes just that depth again, the
+// lowest id. The memory is the same as with 64 bits: low word, high word.
 //
 // Uses: nothing.
 

@@ -1,4 +1,5 @@
-// Stage visibility, per sample, with 64-bit atomics: one maximum takes depth and id together.
+// The nearest triangle of a sample, kept with 64-bit atomics (stage visibility): one maximum takes depth and id
+// together, and of equal depths the lowest id.
 //
 // Uses: nothing.
 

@@ -1,5 +1,6 @@
-// Stage shade, per point: its position in its triangle. Twin of
-// src/render/backend/cpu/surface/barycentric.rs.
+// Barycentric coordinates of shaded points (stage shade): where each point lies in its triangle, corrected for
+// perspective, and how this changes from pixel to pixel. Other values, such as normals and texture coordinates, are
+// interpolated by them. Twin of src/render/backend/cpu/surface/barycentric.rs.
 //
 // Uses: common.wgsl (CLIPPED, has, homogeneous, OUTSIDE, recip, rn2, rn3, rn4, Vertex),
 // one_job.wgsl or gang.wgsl (frame), geometry/triangle.wgsl (area_of, is_negative).

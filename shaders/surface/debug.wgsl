@@ -1,4 +1,5 @@
-// Stage shade, per point: debug views, which show a triangle's numbers as colours. Twin of
+// Debug views (stage shade): in place of a surface's own colour, numbers of the triangle at a point are shown as
+// colours, such as barycentric coordinates, the normal or texture coordinates. Twin of
 // src/render/backend/cpu/surface/debug.rs.
 //
 // Uses: common.wgsl (dot3, has, rn2, rn3, UVS, VERTEX_COLORS), one_job.wgsl or gang.wgsl (frame),

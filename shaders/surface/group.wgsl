@@ -1,5 +1,6 @@
-// Stage shade, per pixel: groups the samples that show the same triangle. Shared by shade.wgsl and
-// composite.wgsl, each of which defines triangle_of_sample(sample).
+// Groups of a pixel's samples that show the same triangle (stage shade). A group is shaded once, at the mean
+// position of its samples. Shared by shade.wgsl, paint.wgsl and composite.wgsl, each of which defines
+// triangle_of_sample(sample).
 //
 // Uses: common.wgsl (ADAPTIVE, has, pixel_corner, recip, rn2, sample_count, sample_offset,
 // SURFACE), one_job.wgsl or gang.wgsl (frame), peeling/composite.wgsl or surface/paint.wgsl or

@@ -1,4 +1,5 @@
-// Stages shade and mixed: colours of the outline mesh's triangles, and the id of no triangle.
+// The colours of the hull, the mesh of triangles beside silhouette edges that is drawn as the outline of a surface
+// (stages shade and mixed). Also the id that stands for no triangle.
 //
 // Uses: common.wgsl (has, HULL_MATERIALS), one_job.wgsl or gang.wgsl (frame).
 

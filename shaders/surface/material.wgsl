@@ -1,4 +1,5 @@
-// Stage shade, per triangle: its material. The CPU's is ShadedMaterial in src/render/plan/surface/mod.rs.
+// The material of a triangle, as shading reads it: colours, metallic and roughness, wires, textures, and flags
+// (stage shade). The CPU's counterpart is ShadedMaterial in src/render/plan/surface/mod.rs.
 //
 // Uses: common.wgsl (has, TRIANGLE_MATERIALS), one_job.wgsl or gang.wgsl (frame).
 

@@ -1,4 +1,6 @@
-// Stage shade, per point: the normal for lighting. Twin of src/render/backend/cpu/surface/normal.rs.
+// The normal at a point of the surface, for lighting (stage shade): that of the face, the interpolated one of its
+// corners, or one from derivatives of the position; a normal texture may bend it. Twin of
+// src/render/backend/cpu/surface/normal.rs.
 //
 // Uses: common.wgsl (DERIVATIVE_NORMALS, dot3, FACE_NORMALS, has, rn, rn3, VERTEX_NORMALS),
 // one_job.wgsl or gang.wgsl (frame), surface/barycentric.wgsl (Barycentrics, blend3,

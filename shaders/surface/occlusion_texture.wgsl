@@ -1,5 +1,5 @@
-// Stage shade, per point: the file's occlusion texture, which darkens ambient light only. Twin of
-// src/render/backend/cpu/surface/occlusion_texture.rs.
+// The effect of an occlusion texture, which a mesh file may have (stage shade): it darkens ambient light at a
+// point, and no other light. Twin of src/render/backend/cpu/surface/occlusion_texture.rs.
 //
 // Uses: common.wgsl (dot3, rn), one_job.wgsl or gang.wgsl (frame), surface/light.wgsl (Light).
 

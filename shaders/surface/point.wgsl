@@ -1,5 +1,5 @@
-// Stage shade, per point: the colour of a point of the surface. Twin of
-// src/render/backend/cpu/surface/point.rs.
+// The colour of a point of the surface (stage shade): base colour, vertex colours and textures, under the light,
+// with wires over them. Twin of src/render/backend/cpu/surface/point.rs.
 //
 // Uses: common.wgsl (DEBUG, has, rn, rn3, rn4, rolled_off, TEXTURES, VARYING,
 // VERTEX_COLORS, WIRE_LIT, WIRES), one_job.wgsl or gang.wgsl (frame), surface/barycentric.wgsl

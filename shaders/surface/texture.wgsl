@@ -1,5 +1,9 @@
-// Stage shade, per point: texture lookups. Twin of src/render/backend/cpu/surface/texture/mod.rs: the same
-// bits, because texels decide what a mask leaves and where nearest texels change.
+// Texture lookups (stage shade): the colour of a texture at a point of the surface, filtered over the part of the
+// texture that a pixel covers. Twin of src/render/backend/cpu/surface/texture/mod.rs.
+//
+// The result has the same bits as on the CPU, because a small difference can show: alpha decides whether an alpha
+// mask leaves a point out, and without filtering a point on the border of two texels gets the colour of one of
+// them.
 //
 // Uses: common.wgsl (quick_recip, quick_rsqrt, rn, rn2, rn4), one_job.wgsl or gang.wgsl (frame),
 // surface/barycentric.wgsl (Barycentrics, blend2), surface/material.wgsl (is_quartered, materials,

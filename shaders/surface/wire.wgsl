@@ -1,5 +1,5 @@
-// Stage shade, per point: wires from barycentric coordinates. Twin of
-// src/render/backend/cpu/surface/wire.rs.
+// Wires along the edges of triangles (stage shade): how much a wire covers of a point, found from the point's
+// barycentric coordinates. Twin of src/render/backend/cpu/surface/wire.rs.
 //
 // Uses: common.wgsl (EDGE_MASKS, has, rn, WIRE_MINIMUM), one_job.wgsl or gang.wgsl (frame),
 // surface/barycentric.wgsl (Barycentrics, quad_around), surface/material.wgsl (attributes,

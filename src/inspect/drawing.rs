@@ -1,4 +1,5 @@
-//! Pictures of meshes that were judged or compared, and of what was found.
+//! Pictures of meshes that were judged by rules or compared: a mesh with marks where rules are broken; or one or both
+//! of two meshes that were compared, seen by one camera, as they look or in the colours of their distance.
 
 use crate::check::Place;
 use crate::diff::{self, Compared};

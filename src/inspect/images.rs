@@ -1,4 +1,5 @@
-//! Images of a mesh, looked at without decoding them.
+//! The test whether an image of a mesh (a texture) is damaged, without decoding its pixels: its header is read, and
+//! of a PNG also the checksums. Reports name the images that fail it, and so does the rule `no-warnings`.
 
 use std::io::BufRead;
 

@@ -1,4 +1,5 @@
-//! For tests: OBJ files in the making, of forms whose figures are known.
+//! OBJ files that tests make: cubes, rings, planes, spheres and rows of triangles, whose figures, such as the area or
+//! the number of holes, are known.
 
 /// An OBJ file in the making.
 #[derive(Clone, Default)]

@@ -1,4 +1,5 @@
-//! Errors of the library, by who is at fault.
+//! Errors of the library. Each says which party can mend it: the author of the mesh, the author of the request, the
+//! caller, or the machine.
 
 use meshsnap_render::backend::DrawError;
 use meshsnap_render::encode::EncodeError;

@@ -1,4 +1,5 @@
-//! Drawing a mesh, again and again.
+//! The `Renderer`: draws meshes on the CPU or on a GPU, and keeps its buffers from picture to picture. It gives an
+//! image, an image in linear light, or the triangle that each pixel shows.
 
 use std::sync::Arc;
 

@@ -1,4 +1,5 @@
-//! The request as a Rust value: a style, typed setters, and the keys of the request document.
+//! The request (what a picture shows, and how it looks) as a Rust value: a style, typed setters, and the keys of the
+//! request document.
 
 use std::sync::{Arc, OnceLock};
 

@@ -1,5 +1,6 @@
-//! Reads the files named on the command line as one bundle. Files that a mesh refers to must be
-//! named too.
+//! The reading of the files that a command line names as one bundle: a mesh and the files that it refers to, such as
+//! its textures. A file that is not named is not read, so files that a mesh refers to must be named too. Also says
+//! which of the named files the mesh does not use.
 
 use std::path::{Component, Path, PathBuf};
 

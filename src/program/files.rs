@@ -1,4 +1,5 @@
-//! Reads files and writes to standard output; the name `-` means a standard stream.
+//! The reading of a file, or of standard input under the name `-`, up to a largest size, and the writing to standard
+//! output. The error for a misspelt name proposes the nearest one in the same folder.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read as _, Seek as _, Write as _};

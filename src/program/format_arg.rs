@@ -1,4 +1,5 @@
-//! `--format-in`, which the commands that read meshes take.
+//! The option `--format-in` of `inspect`, `check` and `diff`: the format of a mesh, for files whose bytes do not tell
+//! it.
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;

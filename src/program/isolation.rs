@@ -1,4 +1,6 @@
-//! Has importers in C run in processes of their own. Linux has what that takes; elsewhere they run in this one.
+//! The choice of the process in which decoders written in C or C++ (for FBX and meshoptimizer) read a mesh file. On
+//! Linux they run in sandboxed processes of their own, so that a broken or hostile file does not harm this one. On
+//! other systems they run in this process.
 
 #[cfg(all(target_os = "linux", any(feature = "fbx", feature = "meshopt")))]
 mod here {

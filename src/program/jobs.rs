@@ -1,4 +1,4 @@
-//! `meshsnap jobs`: lists the jobs in a data folder, also while a server uses it.
+//! `meshsnap jobs`: lists the jobs that a server keeps in its data folder, also while the server runs.
 
 use std::fmt::Write as _;
 use std::io::ErrorKind;

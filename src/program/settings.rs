@@ -1,4 +1,5 @@
-//! Makes command-line arguments of the table of settings.
+//! Command-line flags, made from the server's table of settings: for `serve` all settings that may be flags, for the
+//! commands that read meshes only limits.
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::error::ErrorKind;

@@ -1,4 +1,6 @@
-//! Files that a mesh refers to, that the command does not name, and that lie beside the mesh.
+//! The files that a mesh refers to, that lie beside it, and that the command does not name, such as its textures.
+//! They are found here; where the command allows it, they are read, and otherwise a sentence advises the user to name
+//! them.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;

@@ -1,7 +1,7 @@
-//! Calls decoders of other crates, so that a panic in one is a fault of what it was given.
+//! A guard around calls of decoders from other crates: a panic in a decoder becomes an error.
 //!
-//! Their input is hostile. A panic that is caught here costs one job and says which decoder failed; the panic hook
-//! has logged where.
+//! Decoders read files of unknown origin, which may be made to break them. A panic that is caught here
+//! costs one job, and the error says which decoder failed. The panic hook has logged where.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 

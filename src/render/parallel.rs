@@ -1,8 +1,8 @@
-//! Work on many pieces of a file or a mesh at once.
+//! Parallel work on the items of a list, such as pieces of a file or of a mesh.
 //!
-//! It is done by the thread pool that the caller is in, or else by rayon's own, which has a thread
-//! for each core. A single piece is done by the calling thread. No result depends on the number
-//! of threads.
+//! It is done by the thread pool that the caller is in, or else by rayon's own, which has a thread for
+//! each core. A single piece is done by the calling thread. No result depends on the number of threads.
+//! `beside` alone starts threads of its own, which work while the calling thread does something else.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::thread;

@@ -1,4 +1,4 @@
-//! Counts with their nouns, for messages.
+//! Counts with their nouns in the singular or the plural, for messages: `1 face`, `2 faces`.
 
 use std::fmt::Display;
 

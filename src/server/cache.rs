@@ -1,4 +1,6 @@
-//! A cache under a cap of bytes, for [`pictures`](super::pictures) and [`residents`](super::residents).
+//! A cache with a limit on the bytes of its values together, for answers ([`pictures`](super::pictures)) and for
+//! meshes ([`residents`](super::residents)). Where room is short, values that are used least go first: the crate
+//! `quick_cache` chooses them, by an algorithm like Clock-PRO.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What the service counts and measures, for Prometheus.
+//! The counters, gauges and histograms of the service, and their text for Prometheus (`/metrics`).
 
 use std::time::Duration;
 

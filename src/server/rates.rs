@@ -1,4 +1,5 @@
-//! How much a party may ask for: so many requests a second, some at once, and so many pieces of work a day.
+//! Rate limits of each client (an API key, or an address where there are no keys): how many requests per second, how many
+//! at once, and how many uploads and jobs per day.
 
 use std::num::NonZeroU32;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,5 +1,5 @@
-//! Stored meshes in the form in which they are drawn, kept in memory so that the next picture reads no
-//! file. The least useful go first.
+//! A cache of stored meshes in the form in which they are drawn, so that the next picture of a mesh need not read its file
+//! again. Where room is short, those that are used least go first.
 //!
 //! Invariant: no picture, warning or refusal depends on what is kept.
 

@@ -1,8 +1,9 @@
-//! Signed addresses: whoever has one may GET what it names until it expires, without an API key. For `<img>` tags.
+//! Signed addresses, for `<img>` tags: with one, a browser may GET a picture of a stored mesh without an API key, until the
+//! address expires.
 //!
-//! The signature is HMAC-SHA256 under the SHA-256 of an API key, in hexadecimal digits, over path and query, which ends in the time of expiry:
-//! `/v1/meshes/SHA256/render.png?style=wire&exp=1767225600`. It is added as the last key of the query, `sig`, in
-//! hexadecimal digits.
+//! The signature is HMAC-SHA256 over path and query, which ends in the time of expiry, in seconds since 1970:
+//! `/v1/meshes/SHA256/render.png?style=wire&exp=1767225600`. The key of the HMAC is the text of an API key's SHA-256, in
+//! hexadecimal digits. The signature is added as the last key of the query, `sig`, in hexadecimal digits.
 
 use std::fmt::Write as _;
 

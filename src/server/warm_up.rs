@@ -1,5 +1,5 @@
-//! Opens the GPU right after the start and makes the pipelines of every style, so that the first
-//! pictures need not wait for that.
+//! The warm-up of a hardware GPU: right after the start, a thread opens it and makes the pipelines (compiled shaders) of
+//! every style of picture, so that the first pictures need not wait for that.
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};

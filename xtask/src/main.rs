@@ -1,7 +1,7 @@
 //! `cargo xtask`: one entry for what developers run.
 //!
-//! It only calls what exists: scripts, cargo commands, and the environment variables that tests read. Each of these also works
-//! without it. [`tasks`] has a function per command.
+//! Most commands only call what exists: scripts, cargo commands, and the environment variables that tests read. These
+//! also work without it. [`tasks`] has the functions behind the commands.
 
 mod tasks;
 
@@ -14,7 +14,7 @@ cargo xtask COMMAND
   test quick                 the quick tier: under a minute after the build
   test long                  all tests the long way; minutes to hours
   test FILTER...             tests of the suite whose names contain a filter
-  bless pictures|schema|tables|examples
+  bless pictures|schema|tables|examples|library
                              store what tests compare with anew, then test against it
   bench [accuracy|load|cached|browse|gpu|crashes|stages] [OPTIONS]
                              measure error and time (accuracy), a server, a GPU, jobs beside crashes, or stages

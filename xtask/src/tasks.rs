@@ -1,4 +1,5 @@
-//! The commands. Each says what it runs, runs it in the repository's root, and stops at the first failure.
+//! The commands of `cargo xtask`. Each prints the command lines that it runs, runs them in the repository's root, and
+//! stops at the first failure.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

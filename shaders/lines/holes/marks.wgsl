@@ -1,5 +1,6 @@
-// Stage lines, per pixel: marks the pixels in which the summed areas of insets do not tell how much
-// the lines leave free. Shared by holes.wgsl and tips.wgsl, which declare the buffer `strokes`.
+// The marking of the pixels around a given one (stage lines). In a marked pixel, the summed areas of insets (parts
+// of faces between the lines) do not tell how much the lines leave free, so its coverage is found in another way.
+// Shared by holes.wgsl and tips.wgsl, which declare the buffer `strokes`.
 //
 // Uses: one_job.wgsl (batch, frame), lines/holes/holes.wgsl or lines/holes/tips.wgsl (strokes),
 // lines/stroke_words.wgsl (HOLE_WORD, STROKE_WORDS).

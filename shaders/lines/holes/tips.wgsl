@@ -1,5 +1,7 @@
-// Stage lines, per triangle: finds tips, corners that are visible though no sample shows their
-// triangle. Twin of src/render/backend/cpu/lines/holes/tips.rs.
+// The search for tips (stage lines): corners that are visible although no sample of their pixel shows their
+// triangle, such as the point of a spike. holes.wgsl finds faces by their samples, and so misses these. The pixels
+// around a tip are marked, and lines are drawn there edge by edge. Twin of
+// src/render/backend/cpu/lines/holes/tips.rs.
 //
 // Uses: common.wgsl (mul_wide, OUTSIDE, rn, sample_count, sub_wide, Vertex, WORKGROUP),
 // one_job.wgsl (batch, frame), geometry/culling.wgsl (passes_culling), geometry/triangle.wgsl

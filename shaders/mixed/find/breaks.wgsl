@@ -1,5 +1,8 @@
-// Stage mixed, per pixel of a band and one more on each side: where colours break off from sample to sample. Twin of
-// find_breaks in src/render/backend/cpu/mixed/find/mod.rs.
+// The search for colour breaks, places where the colour differs clearly (stage mixed): two samples that follow
+// each other show different faces, or a face and nothing, whose colours are not alike. Samples are compared inside
+// each pixel of a band of rows and of a border of one pixel around it, and across the pixel's left and upper side.
+// From the breaks, mixed_pixels.wgsl finds the pixels that are drawn again from more points. Twin of find_breaks
+// in src/render/backend/cpu/mixed/find/mod.rs.
 //
 // Uses: common.wgsl (has, sample_count, SIXTEEN_SAMPLES, WORKGROUP), one_job.wgsl (batch, frame),
 // mixed/find/look.wgsl (step_between), mixed/find/seen_faces.wgsl (BREAKS_LEFT, breaks_of,

@@ -1,5 +1,12 @@
-// Stage mixed, per pixel: the mixed pixels, and the number of each. Twin of join and leave_layers in
-// src/render/backend/cpu/mixed/find/mod.rs. Numbers are in no order; nothing depends on it.
+// The list of mixed pixels, which are drawn again from more points (stage mixed). breaks.wgsl and thin.wgsl have
+// marked colour breaks, places where the colour differs clearly. A pixel is mixed if it has a break between its
+// own samples, at a thin triangle in it, or across one of its four sides, or if a neighbour on one of these sides
+// has a strong break among its own samples. It gets 256 points if any of these breaks is strong, else 64. Pixels
+// in which a transparent layer is visible are left out. Twin of join and leave_layers in
+// src/render/backend/cpu/mixed/find/mod.rs.
+//
+// Each mixed pixel gets a number from an atomic counter. The order varies from run to run, but nothing depends on
+// it.
 //
 // Uses: common.wgsl (has, PEELING, sample_count, WORKGROUP), one_job.wgsl (batch, frame),
 // mixed/place.wgsl (breaks_at, FEW, list_at, LIST_END, number_at, pixel_at), peeling/state.wgsl

@@ -1,4 +1,6 @@
-// Stage mixed: the faces that samples show, and where colours break off from one to the next.
+// Access to the visibility buffer for the search for mixed pixels, which are drawn again from more points because
+// different colours meet there (stage mixed): the triangle at a sample, and its depth. Also the bits that note
+// where in a pixel there are colour breaks, places where the colour differs clearly.
 //
 // Uses: common.wgsl (sample_count), one_job.wgsl (batch, frame), mixed/find/look.wgsl (STEP_HARD,
 // STEP_NONE), surface/hull.wgsl (NOTHING).

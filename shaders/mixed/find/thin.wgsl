@@ -1,5 +1,8 @@
-// Stage mixed, per triangle: those that are so thin that samples miss them, as hairs and slivers. Twin of
-// src/render/backend/cpu/mixed/find/thin.rs and thinness.rs.
+// The search for thin triangles, such as hairs and slivers, which samples may miss (stage mixed). They are less
+// than a pixel high, and at least a pixel and four times their height long. A pixel that such a triangle touches
+// is marked if no sample of it shows the triangle and the triangle's colour differs clearly from that of what lies
+// behind it. mixed_pixels.wgsl chooses marked pixels to be drawn again from more points. Twin of
+// src/render/backend/cpu/mixed/find/thin.rs and src/render/backend/cpu/mixed/thinness.rs.
 //
 // Uses: common.wgsl (has, mul_wide, negate_wide, OUTSIDE, pixel_corner, SIXTEEN_SAMPLES, sub_wide,
 // WORKGROUP), one_job.wgsl (batch, frame), geometry/culling.wgsl (passes_culling),

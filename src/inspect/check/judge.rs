@@ -1,4 +1,6 @@
-//! Judges a mesh by rules.
+//! The judgement of a mesh by rules: one result per rule, in the order of the rules, with the number that was found,
+//! the number that is allowed, a sentence, and the first places where the rule is broken. Edges and topology are
+//! computed when the first rule needs them. Also the result for a file that cannot be read.
 
 use std::rc::Rc;
 

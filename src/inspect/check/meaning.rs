@@ -1,4 +1,5 @@
-//! The demand of each rule, in a sentence, for reports that explain themselves.
+//! The sentence that says what each rule demands, by the name of the rule: "No face is without area." for
+//! `no-degenerate`. Reports show it to readers who do not know the rules.
 
 /// The sentence of a rule, by its name; empty for a name that is none.
 pub fn meaning(rule: &str) -> &'static str {

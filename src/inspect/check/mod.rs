@@ -1,8 +1,9 @@
-//! Checks: rules that a mesh has to obey, and what they find. [`Rule`] is a rule as a client writes
-//! it, [`check`] judges a mesh by several, and a [`Verdict`] is what a pipeline reads.
+//! Checks: the judgement of a mesh by rules such as `watertight` or `max-triangles:200000`, for `meshsnap check` and
+//! for HTTP. [`Rule`] is a rule as a client writes it, [`check`] judges a mesh by several rules, and a [`Verdict`] is
+//! the result for one file: whether it passes, and what was found for each rule.
 //!
-//! These are data transfer objects: the names of their fields are part of the public interface.
-//! Nothing here reads a file.
+//! Verdicts are written as JSON, so the names of their fields are part of the public interface. Nothing here reads a
+//! file.
 
 mod judge;
 mod meaning;

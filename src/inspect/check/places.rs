@@ -1,4 +1,7 @@
-//! Positions of faults, in the file's space.
+//! Places of faults: the vertex, the edge or the face where a rule is broken, with positions in the coordinates of
+//! the file (in memory, a mesh is scaled into a box of side 1). All faults are counted, and the first of them are
+//! kept with their places. Positions are rounded to about seven digits, because those of a mesh are f32 and have no
+//! more.
 
 use super::Place;
 use meshsnap_render::mesh::Mesh;

@@ -1,4 +1,6 @@
-//! Polygons with more than four corners, by the triangles that they were divided into.
+//! Polygons with more than four corners, for the rule `no-ngons`. Reading has divided all polygons into triangles and
+//! has marked the edges that it added, so that the triangles of one polygon can be put together again here: more than
+//! two of them make such a polygon.
 
 use meshsnap_render::limits::{Budget, LimitExceeded};
 use meshsnap_render::mesh::Mesh;

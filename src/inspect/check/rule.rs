@@ -1,4 +1,6 @@
-//! Rules as they are written: `watertight`, `max-triangles:200000`, `bounds:10,10,2.5`.
+//! Rules as users write them, on the command line, in `meshsnap.toml` or over HTTP: a name, and for some rules a
+//! limit, as in `watertight`, `max-triangles:200000`, `bounds:10,10,2.5`. They are read here, and mistakes in them
+//! are named.
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! Each rule on a mesh that obeys it and on one that does not.
+//! Tests of rules, on meshes that obey a rule and on meshes that break it.
 
 use super::*;
 use crate::made_obj::{Obj, SIDES};

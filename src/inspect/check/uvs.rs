@@ -1,4 +1,6 @@
-//! Texture coordinates: whether they lie in the texture, and whether faces overlap there.
+//! The two rules on texture coordinates: `uv-in-range`, by which they lie within the texture, from 0 to 1, and
+//! `uv-no-overlap`, by which no two faces use the same part of the texture. Overlaps are looked for at the points of a
+//! grid of 1,024 on a side, so that an overlap between these points is not found.
 
 use super::places::{self, Faults};
 use meshsnap_render::import::MeshError;

@@ -1,4 +1,6 @@
-//! Closed parts that are inside out.
+//! Closed parts of a mesh that are inside out, for the rule `no-inverted-volume`: their faces look inwards, so their
+//! signed volume is negative. Such a part within the bounding box of a solid is taken for a cavity of that solid, and
+//! is no fault.
 
 use super::places::{self, Faults};
 use meshsnap_render::limits::{Budget, LimitExceeded};

@@ -1,4 +1,6 @@
-//! Meshes in the colours of their distance, for a picture of a difference.
+//! A mesh painted by its distance from another mesh, for the picture that shows where two meshes differ: its vertices
+//! are grey where there is no distance, and red at the largest one. Also the points to which one camera for both
+//! meshes is fitted, and the legend of the colours.
 
 use meshsnap_render::limits::{Budget, LimitExceeded};
 use meshsnap_render::mesh::{MaterialSlot, Mesh};

@@ -1,4 +1,5 @@
-//! Holes that one mesh has and the other has not.
+//! Holes that one mesh has and the other has not: connected edges that have one face in the first mesh, and two or
+//! more in the other.
 
 use rapidhash::RapidHashMap;
 

@@ -1,4 +1,6 @@
-//! Materials, textures and texture coordinates of two meshes.
+//! Differences between the materials, the textures and the texture coordinates of two meshes: materials that were
+//! added, removed or changed, and the number of faces that are in both meshes but with another material or other
+//! texture coordinates.
 
 use rapidhash::RapidHashMap;
 use serde::Serialize;

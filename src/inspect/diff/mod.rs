@@ -1,8 +1,8 @@
-//! The differences between two meshes: their surfaces, parts, faces, topology and materials, in numbers and in the
-//! words of a reviewer. Vertex order, face order and the format of the file do not count.
+//! The differences between two meshes: their surfaces, parts, faces, topology and materials, in numbers and in
+//! sentences as a reviewer would write them. Vertex order, face order and the format of the file do not count.
 //!
-//! These are data transfer objects: the names of their fields are part of the public interface. Nothing here
-//! reads a file.
+//! A `Difference` is written as JSON, so the names of its fields are part of the public interface. Nothing here reads
+//! a file.
 
 mod distance;
 mod faces;

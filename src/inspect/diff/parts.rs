@@ -1,5 +1,5 @@
-//! Connected parts of two meshes: which moved, came, went or changed. Faces with a common edge are of one part; surfaces
-//! that touch in a vertex alone are two.
+//! The connected parts of two meshes, matched with each other: each part is unchanged, moved, turned, changed, added
+//! or removed. Faces with a common edge are of one part; surfaces that touch in a vertex alone are two parts.
 
 use std::collections::VecDeque;
 

@@ -1,4 +1,5 @@
-//! Differences of meshes whose differences are known.
+//! Tests of the comparison of meshes, on meshes whose differences are known: made on purpose, given by a formula, or
+//! found by a brute-force search.
 
 use super::*;
 use crate::made_obj::Obj;

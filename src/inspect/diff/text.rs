@@ -1,4 +1,5 @@
-//! A difference for people.
+//! The difference between two meshes as text for a person: whether they are the same, the sentences of the summary,
+//! the largest and the mean distance, and a line for each further number that differs.
 
 use std::fmt::Write as _;
 

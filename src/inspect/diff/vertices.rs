@@ -1,4 +1,6 @@
-//! Which vertices of two meshes are the same.
+//! Vertices that two meshes have in common: each vertex of the second mesh gets the number of the vertex of the first
+//! mesh that lies at the same place, within a tolerance, or else a new number. A grid of small cubes finds the
+//! nearest vertex fast.
 
 use rapidhash::RapidHashMap;
 

@@ -1,4 +1,5 @@
-//! A mesh that as a whole is larger, or elsewhere.
+//! The test whether a mesh is another one that was scaled by one factor and shifted as a whole, as by a change of the
+//! unit from millimetres to inches. Such a change can then be told in one sentence, and not as a change of each part.
 
 use super::faces::Faces;
 use super::frame::{Frame, diagonal};

@@ -1,4 +1,5 @@
-//! What a reviewer would say of two meshes.
+//! Sentences on the differences between two meshes, as a reviewer would write them: "one part moved by (0, 0, 1)". They
+//! go from the most to the least important. Of a long list, five are written, and a last one counts the others.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! The area and the volume of a mesh, in file units, for `inspect`.
+//! The area and the volume of a mesh, in file units, for reports and for comparisons.
 
 use meshsnap_render::mesh::Mesh;
 use meshsnap_render::mesh::vector::{cross, dot, sub};

@@ -1,7 +1,8 @@
-//! The point of a mesh that is nearest to another point, by a tree of boxes (a bounding volume
-//! hierarchy).
+//! The distance from a point to the nearest face of a mesh, and the first face that a ray meets, by a tree of boxes
+//! (a bounding volume hierarchy).
 //!
-//! Distances are computed in f64, in units of the mesh's unit box. Positions are stored as the mesh has them, in f32.
+//! Distances are computed in f64, in units of the mesh's unit box: the box of side 1 into which reading scales a
+//! mesh. Positions are stored as the mesh has them, in f32.
 
 use meshsnap_render::limits::{Budget, LimitExceeded};
 use meshsnap_render::mesh::Mesh;

@@ -1,4 +1,5 @@
-//! The thickness of a solid's walls: the way from a face to the surface opposite, straight inwards.
+//! The thickness of a solid's walls: the distance from the middle of a face, straight inwards, to the surface
+//! opposite.
 
 use super::nearest::NearestFaces;
 use meshsnap_render::limits::{Budget, Deadline, Exhausted, Stopped};

@@ -1,4 +1,5 @@
-//! The bounding box of a mesh in a report, in the file's own space.
+//! The bounding box of a mesh in a report, in the file's own space, and the rounding of figures to the digits that
+//! mean something.
 
 use meshsnap_render::mesh::Mesh;
 use serde::Serialize;

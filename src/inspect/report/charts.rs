@@ -1,4 +1,5 @@
-//! The UV charts of a mesh: how they use the texture, how much they stretch it, and where they overlap.
+//! The section of a report on UV charts, the pieces into which a texture unfolds a surface: how much of the texture
+//! they use, how much they stretch it, and how much they overlap.
 
 use serde::Serialize;
 

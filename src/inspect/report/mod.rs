@@ -1,7 +1,7 @@
 //! The report on a mesh: everything that is known of a file without drawing it.
 //!
-//! `meshsnap inspect --json` prints it and HTTP answers with it, in one shape. These are data
-//! transfer objects, and their field names are part of the public interface.
+//! `meshsnap inspect --json` prints it and HTTP answers with it, in one shape. The names of the fields of a `Report`
+//! and of its parts are those of the JSON, and so part of the public interface.
 
 mod bounds;
 mod charts;

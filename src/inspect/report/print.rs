@@ -1,4 +1,5 @@
-//! Figures for printing a mesh: the thickness of its walls, its overhangs, and the way in which it stands on the bed.
+//! The section of a report on 3D printing: the thickness of walls, overhangs that need support, and the way in which
+//! the mesh stands on the bed of the printer.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,5 @@
-//! The topology part of a report, after welding.
+//! The section of a report on topology, the way in which faces are connected: connected parts, edges, holes, and
+//! faults such as edges with three faces. Vertices at the same position count as one.
 
 use meshsnap_render::mesh::topology::Topology;
 use meshsnap_render::pluralise::pluralise;

@@ -1,5 +1,6 @@
-//! Baselines: the faults of each mesh that are accepted, as files in a folder, and so do not fail it again; beside them
-//! its pictures, if views are asked for.
+//! Baselines: folders in which the accepted faults of meshes are stored. A mesh with faults has a JSON file there; a
+//! fault that is in it, and has not grown, does not fail the mesh again. If views are asked for, the accepted
+//! pictures of the mesh lie beside that file.
 
 use std::fs;
 use std::io::ErrorKind;

@@ -1,4 +1,5 @@
-//! The changes of a mesh since a commit, in words, and its older side.
+//! The changes of a mesh since a git commit, in sentences as those of `meshsnap diff`, and the mesh as it was in that
+//! commit, from which pictures of before are drawn.
 
 use std::path::Path;
 

@@ -1,4 +1,5 @@
-//! `meshsnap.toml`: the rules of a repository, and of some files in it.
+//! `meshsnap.toml`, the configuration of `meshsnap check` in a repository: the rules for all meshes, other rules for
+//! files that fit a glob, the folder of accepted faults, and the views of pictures in reports.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,6 @@
-//! Pictures for reports of `check`: each view of a file now, its accepted picture, and their difference. Faults are marked.
+//! Pictures for the reports of `meshsnap check`: a mesh from each view that is asked for, with marks where rules are
+//! broken. If it looked otherwise before, there are two more: the picture of before, and one of the difference.
+//! Before means the commit of `--since`, or else the accepted picture in the baseline.
 
 use std::fs;
 use std::path::{Path, PathBuf};

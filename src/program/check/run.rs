@@ -1,4 +1,6 @@
-//! Judges many files at once, and prints what is said of each in their order.
+//! The run of `meshsnap check` over many files. Several threads judge one file each at the same time; the verdicts
+//! are printed in the order of the files, whatever the order in which they are ready. At the end, the reports are
+//! written.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};

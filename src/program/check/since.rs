@@ -1,4 +1,6 @@
-//! `--since REF`: the meshes that changed and their older sides, by the `git` program.
+//! `meshsnap check --since REF`: leaves out the meshes that have not changed since a git commit, and reads files as
+//! they were in that commit, both by the program `git`. A mesh also counts as changed if a file has changed that it
+//! names, such as a texture.
 
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};

@@ -1,4 +1,5 @@
-//! Two meshes on the command line: their differences as text, JSON or a picture.
+//! The comparison of two meshes by `meshsnap diff`: it prints the differences as text or JSON, and writes pictures of
+//! them if they are asked for.
 
 use std::sync::Arc;
 

@@ -1,4 +1,5 @@
-//! What differs between two pictures.
+//! The comparison of two pictures by `meshsnap diff`: it prints the differences as text or JSON, and writes pictures
+//! of them if they are asked for.
 
 use image::ImageFormat;
 

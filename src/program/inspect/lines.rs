@@ -1,4 +1,5 @@
-//! `inspect --jsonl`: the report on each of many meshes, on a line, in the order of their paths.
+//! `inspect --jsonl`: the reports on many meshes, each as a line of JSON, in the order of their paths. A mesh that
+//! cannot be read has a line with the reason.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};

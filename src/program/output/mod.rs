@@ -1,5 +1,6 @@
-//! The place of a picture. A file is replaced as a whole and is never one of the inputs: the bytes
-//! are written to a file beside it, which then takes its name.
+//! The place to which a command writes a picture or a report: a file, standard output, or a device or pipe. A file
+//! that is given as an input is refused. A file is replaced as a whole: the bytes are written to a new file beside
+//! it, which then takes its name.
 
 mod unfinished;
 

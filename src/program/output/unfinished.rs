@@ -1,4 +1,5 @@
-//! Files that are being written. A signal that ends the program takes them away first.
+//! Files that are not yet written to their end, under the names that they have until then. If a signal ends the
+//! program, they are removed first, so that no unfinished file stays behind.
 
 use std::collections::BTreeSet;
 use std::io;

@@ -1,4 +1,5 @@
-//! The printout of `--explain`.
+//! The printout of `render --explain`: the back-end that drew, the state of the GPU, the work that was left out and
+//! why, and the time of each stage.
 
 use std::time::Duration;
 

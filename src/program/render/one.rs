@@ -1,4 +1,5 @@
-//! Draws one mesh into one picture.
+//! `render MESH... -o FILE`: one picture of one mesh. Its files are read, the picture is drawn and written, and
+//! warnings are printed with what to do about them.
 
 use std::ffi::OsString;
 use std::sync::Arc;

@@ -1,4 +1,6 @@
-//! What the command line and the request document ask for.
+//! The request of a picture (what it shows, and how it looks), put together from the request document in JSON, the
+//! short flags and `--set`; each overrides those before it. The error for a wrong value names the place where the
+//! user gave it.
 
 use std::path::Path;
 

@@ -1,4 +1,5 @@
-//! The pictures of `-o DIR/`: which of the named files are meshes, and the name of each picture.
+//! The list of meshes among the files, folders and patterns that a command line names, with the name of a picture for
+//! each, as `render -o DIR/` writes them. `check` and `inspect --jsonl` use the list, too.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

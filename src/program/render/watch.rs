@@ -1,8 +1,8 @@
 //! `render --watch`: draws again whenever a file that was read has changed.
 //!
-//! Files tell by their length and their time of modification that they changed. Notifications of the
-//! system wake the program up early; where there are none (network file systems, a full table of
-//! watches), it looks once a second.
+//! A file counts as changed if its length or its time of modification is another. Notifications of the system wake
+//! the program up early. Where there are none (network file systems, or too many watches), it looks at the files once
+//! a second, or less often if there are so many that looking takes long.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

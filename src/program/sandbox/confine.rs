@@ -1,4 +1,6 @@
-//! What a process gives up: files, network, other processes, new rights, and most system calls.
+//! The rights that a process of the sandbox gives up before it reads a file: opening files, the network, other
+//! processes, new rights, and most system calls. The Linux kernel refuses them from then on, by Landlock and seccomp,
+//! as far as it has these. Its memory and its processor time are bounded, too.
 
 use std::io;
 

@@ -1,5 +1,6 @@
-//! What goes through the socket between the program and a process of the sandbox: first what the kernel refuses it, then
-//! one order with its file, then one answer.
+//! The messages on the socket between the program and a process of the sandbox. First the process says that it is
+//! ready, and which of its protections the kernel has. Then the program sends one order with the file to decode, and
+//! the process one answer.
 
 use std::io::{self, IoSlice, IoSliceMut, Read, Write};
 use std::mem::MaybeUninit;

@@ -1,7 +1,9 @@
-//! Processes in which decoders written in C read strangers' files. Each is another run of this program, which gives up
-//! all rights before its first byte of a file ([`confine`]), and reads one file: what takes it over sees no other.
+//! The sandbox: processes in which decoders written in C read files of strangers. Each is another run of this
+//! program. It gives up all rights before the first byte of a file ([`confine`]), and reads one file: if that file
+//! takes it over, it sees no other file.
 //!
-//! [`pool`] starts them ahead of their jobs, hands each its file, and says why one ended. [`child`] is what they run.
+//! [`pool`] starts the processes ahead of their jobs, hands each its file, and says why one ended. [`child`] is what
+//! they run.
 
 mod child;
 mod confine;

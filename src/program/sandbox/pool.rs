@@ -1,4 +1,6 @@
-//! Processes that wait for a file. Each takes one, and another is started in its place.
+//! The pool of sandboxed processes for decoders written in C. On a server, they are started ahead and wait for a
+//! file; on a command line, one is started when a file needs it. Each decodes one file and ends, and on a server
+//! another takes its place.
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};

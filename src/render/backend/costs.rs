@@ -1,7 +1,9 @@
-//! The cost of drawing a plan on either back-end, for `auto` while the GPU is busy with other jobs.
+//! Estimates of the time that the CPU and the GPU need to draw a plan (what one picture shows). While the GPU is
+//! busy, a job whose back-end is `auto` goes to the CPU if the CPU would draw it sooner.
 //!
-//! A cost is a formula of the plan's size, times a factor for the back-end and the kind of plan, which is
-//! learnt from what plans took. Under load the factors say how much the jobs hold each other up.
+//! An estimate is a formula of the plan's size (triangles, samples and edges), times a factor for the back-end and
+//! the kind of plan: with lines or without, with transparent layers or without. The factors are learnt from the time
+//! that earlier pictures took. Under load they contain how long jobs have to wait for each other.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};

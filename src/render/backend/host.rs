@@ -1,5 +1,8 @@
-//! The process's one GPU: opened on first need, probed before it first draws with a number of samples,
-//! opened again when it was lost.
+//! The owner of the process's one GPU device, which all workers share. The device is opened when a job first needs
+//! it, and opened again after it was lost.
+//!
+//! Before a device draws with a number of samples per pixel for the first time, it has to draw a test picture with
+//! that number (`probe`). A device that draws it wrong is not used.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
-//! The last stage of a picture in linear light, for both back-ends: a row's colours over the background, as half floats.
+//! The last step of a picture whose colours stay in linear light, for both back-ends. It lays the colours of a row
+//! over the background and rounds them to half floats. Other pictures become sRGB bytes instead (`resolve`).
 
 use half::f16;
 

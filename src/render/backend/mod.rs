@@ -1,16 +1,25 @@
-//! Two ways to fill a [`DrawPlan`]: [`cpu`] and [`gpu`], with the same stages in the same order:
+//! The two back-ends that draw the picture of a [`DrawPlan`], which says in slices and numbers what to draw: [`cpu`],
+//! our own rasterizer, and [`gpu`], which uses wgpu. Both have the same stages in the same order:
 //! transform -> visibility -> occlusion -> peeling -> shade -> mixed pixels -> lines -> resolve.
 //!
-//! Transform and visibility are in `geometry`, peeling is the transparent layers, and mixed pixels are
-//! drawn once more where samples are adaptive. A plan that has no use for a stage leaves it out.
+//! - transform moves vertices to the screen, visibility finds the nearest triangle of each sample (both in
+//!   `geometry`). A sample is one of the 1 to 16 places in a pixel at which the picture is computed.
+//! - occlusion finds how much less light hollows get (screen-space ambient occlusion).
+//! - peeling finds the transparent layers in front of each sample, from front to back (depth peeling).
+//! - shade computes colours (in `surface`).
+//! - mixed pixels, in or beside which faces of different colours meet, are drawn once more from many points each, if
+//!   samples are adaptive.
+//! - lines draws edges over the colours.
+//! - resolve lays the colours over the background and makes bytes of them.
 //!
-//! Each stage is written twice, in twins of the same name: `shaders/ROOM/NAME.wgsl` and
-//! `src/render/backend/cpu/ROOM/NAME.rs`. The module's tests hold the constants, structs and bindings that
-//! the two share. `select` chooses a back-end per job, by `costs` where both could draw it; `host`
-//! owns the process's GPU, and [`probe`] checks a GPU before it is used.
+//! A plan that has no use for a stage leaves it out.
 //!
-//! **Invariant:** nothing here imports a mesh or a scene, and the two back-ends do not import each
-//! other.
+//! Each stage is written twice, in twins of the same name: `shaders/FOLDER/NAME.wgsl` and
+//! `src/render/backend/cpu/FOLDER/NAME.rs`. The module's tests compare the constants, structs and bindings that the
+//! two share. `select` chooses the back-end of a job, by `costs` while the GPU is busy. `host` owns the process's
+//! GPU, and [`probe`] checks a GPU before it is used.
+//!
+//! **Invariant:** nothing here imports a mesh or a scene, and the two back-ends do not import each other.
 
 mod costs;
 pub mod cpu;

@@ -1,5 +1,5 @@
-//! The rest of a GPU that is lost again and again: `auto` means the CPU for a while, then the GPU is tried again.
-//! Each rest after a trial in vain is twice as long.
+//! The pause after a GPU was lost in several jobs in a row: for a minute, jobs whose back-end is `auto` are drawn by
+//! the CPU, then the GPU is tried again. If that fails too, the next pause is twice as long, up to an hour.
 
 use std::fmt;
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -1,5 +1,8 @@
-//! Assigns each of the 256 coverage points of a pixel to its nearest sample, so that the stage
-//! lines knows how much of each sample's share a line covers.
+//! The division of a pixel's 256 coverage points among its samples: each sample gets the same number of points, those
+//! closest to it as far as possible.
+//!
+//! The points are a rank-1 lattice. They are finer than samples, of which a pixel has at most 16. The stage lines
+//! counts the points that a line covers, and finds by this division how much that is of what each sample shows.
 
 use std::sync::OnceLock;
 

@@ -1,4 +1,5 @@
-//! Choice of a back-end per job, and recovery when the GPU fails.
+//! The choice of the back-end that draws a job, and the second attempts when a GPU fails. If the device was lost, the
+//! job is drawn once more on a new one. What the GPU could not draw is drawn by the CPU if the choice was `auto`.
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};

@@ -1,5 +1,6 @@
-//! A small font of dots for names and numbers: five columns, nine rows, of which the last two are
-//! below the line.
+//! A small bitmap font for texts in pictures: lower-case letters, digits and a few signs, enough for
+//! names of views and for numbers. A letter has five columns and nine rows of dots; the last two rows lie
+//! below the line on which letters stand.
 
 /// Rows of a letter.
 pub const ROWS: u32 = 9;

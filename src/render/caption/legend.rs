@@ -1,5 +1,6 @@
-//! The legend of a diagnostic view: its colours from the lowest to the highest number, the numbers at both
-//! ends, and what they measure.
+//! The legend of a picture whose colours stand for measured numbers, such as the lengths of edges. It is
+//! a bar of the colours from the lowest number to the highest, with the numbers at both ends and the name
+//! of what is measured, in the lower right corner of the picture.
 
 use super::{TEXT_HEIGHT, dot_px, fill, text_width_px, write};
 use crate::image::Image;

@@ -1,4 +1,5 @@
-//! Marks of places in a finished picture.
+//! Red dots and lines that are drawn over a finished picture to show places, such as edges of the mesh
+//! with a fault. Each mark has a white rim, which sets it off from what is under it.
 
 use crate::image::Image;
 

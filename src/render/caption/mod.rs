@@ -1,5 +1,5 @@
-//! Captions: texts that are written into a finished picture, in a small font of dots, and the legend of a
-//! diagnostic view.
+//! Captions: additions to a finished picture. They are texts in a small font of dots, legends that
+//! explain the colours of a picture, and marks that show places in it.
 
 mod font;
 mod legend;

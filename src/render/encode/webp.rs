@@ -1,7 +1,8 @@
-//! Animated WebP: the container of Google's specification around frames that are lossless files each.
+//! The encoder of animated WebP files. It writes the container, as Google's specification has it, around
+//! frames that are encoded without loss.
 //!
-//! A frame is taken from the file that the encoder of single pictures writes, which is a RIFF header and
-//! one chunk, `VP8L`.
+//! Each frame is first encoded as a file of its own by the encoder of single pictures. Such a file is a
+//! RIFF header and one chunk, `VP8L`. The chunk is then copied into the container.
 
 use image::ExtendedColorType;
 use image::codecs::webp::WebPEncoder;

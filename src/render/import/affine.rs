@@ -1,4 +1,5 @@
-//! Affine maps in f64, for formats whose scenes place their parts.
+//! Affine maps in f64 (a 3 x 3 matrix and a translation), by which a scene places its meshes. They
+//! are for the formats that have scenes: glTF, FBX and 3MF.
 
 use crate::mesh::vector::{cross, dot};
 

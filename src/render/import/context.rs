@@ -1,4 +1,5 @@
-//! The context of an import, given to every importer beside the bytes.
+//! The context of an import, given to every importer beside the bytes of the file: limits, the
+//! memory that may still be allocated, the deadline, the other files of the upload, and options.
 
 use super::bundle::Folder;
 use super::error::MeshError;

@@ -1,5 +1,6 @@
-//! Adds polygons whose corners have their own attributes to a raw mesh, for importers that read
-//! face by face.
+//! Two helpers of importers that read a mesh face by face. `Polygons` splits polygons into
+//! triangles and counts them against the limits. `CornerSet` makes one vertex of each distinct
+//! combination of indices that a corner has: of a position, a normal, a texture coordinate ...
 
 use super::MeshError;
 use super::polygon::Triangulator;

@@ -1,4 +1,5 @@
-//! Errors of importing.
+//! The error of an import: the kind of fault, which has a stable code for programs, and one
+//! sentence that is safe to show to a client.
 
 use super::text;
 use crate::guard::Panicked;

@@ -1,5 +1,6 @@
-//! Importers in C run in another process, if the program has set one up. This room only says what it needs of that
-//! process: the sandbox of `meshsnap-cli` is one.
+//! The interface to another process in which decoders written in C and C++ run, so that a hostile
+//! file that makes one crash there does no harm here. A program may set such a process up: the
+//! sandbox of `meshsnap-cli` is one. Without it these decoders run in this process.
 
 use std::sync::OnceLock;
 

@@ -1,8 +1,11 @@
-//! Bytes to [`Mesh`]: unpacks a bundle, finds its mesh, sniffs the format and calls the importer.
+//! The import of a mesh, from the bytes of an upload to a [`Mesh`]: unpacks an archive, finds the
+//! file that holds the mesh, recognises its format, has the importer of that format read it, and
+//! brings the result into its normal form.
 //!
 //! Reading order: [`bundle`] (the upload, and the files that names refer to), `formats` (the table
-//! of formats), `sniff`, [`raw`] (the mesh that an importer fills), the importers `obj`, `stl`,
-//! `ply`, `off`, `fbx`, `three_mf` and `gltf`, and `normalise` (raw mesh to `Mesh`).
+//! of formats), `sniff` (recognition of a format by its bytes), [`raw`] (the mesh that an importer
+//! fills), the importers `obj`, `stl`, `ply`, `off`, `fbx`, `three_mf` and `gltf`, and `normalise`
+//! (raw mesh to `Mesh`).
 
 mod affine;
 pub mod bundle;

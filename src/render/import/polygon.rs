@@ -1,4 +1,6 @@
-//! Splits polygons into triangles, each with a mask of the edges that belong to the polygon.
+//! The splitting of polygons into triangles: convex quads along the shorter diagonal, others by ear
+//! clipping, and very large ones as fans. Each triangle gets a mask of its edges that belong to the
+//! polygon; the others are diagonals, which a drawing of the edges leaves out.
 
 use crate::import::normalise::pow2::{Pow2, exponent, is_usable, max_abs};
 use crate::warning::Warning;

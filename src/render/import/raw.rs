@@ -1,4 +1,5 @@
-//! The raw mesh that every importer fills in, before normalisation.
+//! The raw mesh: the form in which every importer delivers a mesh, as the file has it. `normalise`
+//! then turns it into the final `Mesh`.
 
 use crate::import::ImportReport;
 use crate::mesh::material::{FileCamera, ImageSource};

@@ -1,5 +1,7 @@
-//! Vertex normals with creases. Where faces at a vertex meet in a sharp edge, each side of the edge has a
-//! normal of its own there.
+//! Vertex normals with creases, for smooth shading of meshes whose files have no normals. A crease is an
+//! edge whose faces' normals differ by more than a given angle. At a vertex on a crease, the faces on
+//! each side of it have a normal of their own, so that shading is smooth on either side and breaks at the
+//! edge.
 
 use rayon::prelude::*;
 

@@ -1,7 +1,8 @@
-//! The [`Mesh`], the one form that every importer produces, and what is computed from it:
+//! The [`Mesh`], the one form into which every importer turns its file, and what is computed from it:
 //! [`normals`], [`creases`], [`edges`], [`topology`].
 //!
-//! **Invariant**: nothing in this room, and nothing after it, depends on the file format.
+//! **Invariant**: nothing in this folder, and nothing that works with a mesh later, depends on the file
+//! format.
 
 pub mod creases;
 pub mod edges;

@@ -1,4 +1,5 @@
-//! Vertex normals, for meshes that bring none.
+//! Vertex normals for meshes whose files have none, which smooth shading needs. The normal at a vertex is
+//! the mean of the normals of its faces, each weighted by the angle of the face's corner there.
 
 use rayon::prelude::*;
 

@@ -1,7 +1,7 @@
-//! Line segments and points: primitives of a file that have no area.
+//! Line segments and points of a file, which have no area.
 //!
-//! The plan draws them as thin triangles. Importers count these triangles against the limit
-//! beforehand.
+//! Where their material has a filled surface, they are drawn as small triangles that face the camera.
+//! Importers count these triangles against the limit beforehand.
 
 /// The number of triangles that a segment is drawn as.
 pub const SEGMENT_TRIANGLES: u64 = 2;

@@ -1,7 +1,9 @@
-//! Vectors of three f64, each operation rounded by itself and in the written order.
+//! Arithmetic with vectors of three f64 (difference, scalar product, vector product), each operation
+//! rounded by itself and in the written order.
 //!
-//! glam's own are not used here: these sums decide edges and volumes, so their order is part of the
-//! result.
+//! The operations of the crate glam are not used here. These sums decide which edges are drawn and which
+//! volumes are reported, so the order of their terms is part of the result. A comparison that puts
+//! positions in order is here, too.
 
 /// `a - b`
 pub fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

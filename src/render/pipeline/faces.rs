@@ -1,4 +1,5 @@
-//! The face that each pixel of a view shows, for programs that draw over a picture themselves.
+//! The face of the mesh that each pixel of a picture shows, and its distance from the eye. Programs that
+//! use the library need both to draw something over a picture themselves.
 
 use super::{Context, RenderError, Stage, Staged, View, with_scene};
 use crate::backend::Renderer as _;

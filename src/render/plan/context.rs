@@ -1,4 +1,6 @@
-//! The state that the stages of one plan share: budget, deadline, skips, and the mesh's edges.
+//! The state that the stages of making one plan share: the memory budget, the deadline, the notes of what
+//! is left out (skips), warnings, and facts about the mesh such as its edges. A fact is found when a
+//! stage first needs it, or taken from an earlier plan of the same mesh.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,4 +1,6 @@
-//! Memory that a plan and the back-ends which draw it will take, spent before it is allocated.
+//! The memory that a plan, and the back-end that draws it, will take. It is computed from the numbers of
+//! pixels, vertices and triangles, and taken from the job's budget before it is allocated. If the budget
+//! does not suffice, the picture is refused.
 
 use super::HullPass;
 use super::geometry::Geometry;

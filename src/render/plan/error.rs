@@ -1,4 +1,5 @@
-//! Errors of making a plan. The input is always at fault.
+//! Errors of making a plan: the picture takes more than is allowed, the file lacks the camera that the
+//! request asks for, or the job was stopped. The program itself is never at fault.
 
 use crate::limits::{Exhausted, LimitExceeded, Stopped};
 use crate::scene::SceneError;

@@ -1,4 +1,6 @@
-//! The positions to which the camera is fitted: all but those of faces that show nothing.
+//! The positions of the mesh to which the camera is fitted. These are all positions, except those that
+//! belong only to faces on which a texture's alpha mask shows nothing: invisible faces must not make the
+//! visible ones small.
 
 use super::PlanError;
 use super::cut_outs::{CutOuts, masked};

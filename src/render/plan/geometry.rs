@@ -1,5 +1,6 @@
-//! The positions and triangles of a plan: those of the mesh, followed by those that stand for lines
-//! and points.
+//! The triangles of a plan, with their positions, normals and materials: first those of the mesh, then
+//! small triangles that stand for its lines and points. The mesh itself is not changed, since triangles
+//! that face the camera belong to one picture.
 
 use super::CornerValues;
 use super::shared_slice::SharedSlice;

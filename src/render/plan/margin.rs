@@ -1,11 +1,12 @@
-//! The margin: how far beyond the picture samples are taken.
+//! The margin: the pixels beyond the picture's border for which visibility samples are taken, too. These
+//! say which face is visible there; nothing is drawn.
 //!
-//! A line is as wide as half a window around its edge, so a pixel at the picture's border may
-//! belong to a line whose middle lies beyond it. What hides that middle is only known where there
-//! are samples. So where lines depend on what hides them, and the mesh goes on beyond the picture,
-//! the visibility buffer does too, by as much as bands of rows look at each other. A pixel's line
-//! coverage is then that of the same pixel in the middle of a larger picture. Nothing else is drawn
-//! in the margin.
+//! A line covers pixels on both sides of its edge, so a pixel at the picture's border may belong to a line whose
+//! edge lies beyond it. Whether a face hides that edge is only known where there are samples. So where faces may
+//! hide lines, and the mesh goes on beyond the picture, the visibility buffer (the nearest face of each sample)
+//! does too. The margin is so wide that the lines in a pixel at the border are those of the same pixel in the
+//! middle of a larger picture. Adaptive samples, for which a pixel is compared with its neighbours, need a margin,
+//! too.
 
 use super::DrawPlan;
 use super::context::{CHECK_EVERY, PlanContext};
@@ -27,7 +28,7 @@ const SURE: f64 = 64.0;
 /// A limit of the errors that rounding a projection to f32 makes, per unit of the box.
 const ROUNDED: f64 = 1e-6;
 
-/// The margin where none is needed but it is kept, pixels.
+/// The least margin that is kept, pixels.
 const KEPT_PX: u32 = 8;
 
 /// The margin of a plan whose lines need `needed_px` where the mesh reaches the border.

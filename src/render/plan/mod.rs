@@ -1,12 +1,13 @@
-//! Scene to [`DrawPlan`]: what to draw, already decided. Back-ends only fill: they see slices and
-//! numbers, never a mesh or a scene.
+//! The plan of a picture: a [`DrawPlan`] lists all that is drawn, already decided. It is made from a
+//! scene (a mesh, a request and the placed camera). Back-ends only draw it: they see slices and numbers,
+//! never a mesh or a scene.
 //!
-//! [`build()`] makes the plan in stages: `primitives` (lines and points), `lines`, `surface`,
-//! `outline` (hulls) and `peeling` (transparent layers). `quality` runs before it and fills in what
-//! a request leaves open.
+//! [`build()`] makes the plan in stages: `primitives` (lines and points), `lines`, `surface`, `outline`
+//! (hulls) and `peeling` (transparent layers). `quality` runs before it and fills in what a request
+//! leaves open.
 //!
-//! Invariant: everything that a scene does not need is left out here, and each omission is written
-//! down in [`DrawPlan::skips`].
+//! Invariant: everything that a scene does not need is left out here, and each omission is written down
+//! in [`DrawPlan::skips`].
 
 mod build;
 mod context;

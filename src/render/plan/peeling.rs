@@ -1,4 +1,7 @@
-//! Depth peeling: which pictures need transparent layers, and which triangles each pass draws.
+//! Depth peeling, as a plan describes it. Transparent surfaces are drawn by it in layers: at each sample
+//! the nearest one is found first, then the next behind it, and so on. It is decided here which pictures
+//! need such layers, and for each triangle whether it belongs to the layers, to the opaque surface, or to
+//! both.
 
 use std::borrow::Cow;
 

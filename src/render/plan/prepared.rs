@@ -1,7 +1,9 @@
-//! Facts about a mesh that do not depend on the picture, kept from one plan of the mesh to the next.
+//! Facts about a mesh that more than one picture of it needs, such as its edges. A fact is kept when a
+//! plan has found it, and later plans of the mesh take it.
 //!
-//! Invariant: what is kept changes no byte, no skip and no refusal. A plan that takes it spends what
-//! finding it took.
+//! Invariant: what is kept changes no byte of a picture, no skip (work that a plan leaves out) and no
+//! refusal. So a plan that takes a fact also takes from its job's budget the memory that finding the fact
+//! took.
 
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 

@@ -1,5 +1,7 @@
-//! The camera as a plan has it: four row vectors in f32, by which back-ends draw, and the same in f64, by which the
-//! plan finds what lies where on screen and what lies before the near plane.
+//! The projection of a picture: four row vectors that turn a position into its place on screen, its
+//! depth, and its distance in front of the eye. `Projection` has them in f32, and back-ends draw by it.
+//! `Projector` has the same rows in f64: by it the plan finds what lies where on screen, and what lies
+//! before the near plane.
 
 use crate::scene::camera::Camera;
 

@@ -1,4 +1,5 @@
-//! Arrays that a plan borrows from its mesh, or owns.
+//! Arrays that a plan either borrows from its mesh or owns. An owned array may serve several fields of
+//! the plan without being copied.
 
 use std::ops::Deref;
 use std::sync::Arc;

@@ -1,4 +1,6 @@
-//! Warnings about a request that does not go with its mesh.
+//! Warnings about a request that does not go with its mesh: a material that the mesh does not have, lines
+//! and points that no layer draws, or a camera that looks past the mesh. The picture is drawn
+//! nevertheless.
 
 use std::collections::BTreeSet;
 

@@ -1,4 +1,6 @@
-//! One item of a request, put into a draft; or the sentence that says what is wrong with it.
+//! The reading of one item of a request, which is a key and its value. The value is checked and put into
+//! the draft, which collects what all items say. If it is wrong, the result is an error whose sentence
+//! says what is allowed.
 
 use crate::limits::IMAGE_PX_MAX;
 use crate::request::Rules;

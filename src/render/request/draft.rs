@@ -1,4 +1,6 @@
-//! A [`Spec`] in the making: its defaults, and what can only be settled when every key is known.
+//! The draft of a [`Spec`], which collects what a request says. It begins with the defaults, and each key
+//! that is read changes it. Defaults that depend on other keys, and conflicts between keys, are settled
+//! at the end, when every key is known.
 
 use super::error::{RequestError, RequestFault};
 use crate::request::Rules;

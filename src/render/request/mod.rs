@@ -1,9 +1,10 @@
-//! Reads requests: a JSON document and dotted keys become a [`Spec`].
+//! The reader of requests: a JSON document and dotted keys become a [`Spec`], the checked description of
+//! a picture.
 //!
-//! Each of these overrides what precedes it: defaults, the style, the document, the dotted keys of
-//! a query or of `--set`. Materials begin from the document's own layers, as they are after all of
-//! these. `null` turns a layer off; for any other key `null` is its default, or the same as leaving
-//! the key out. [`table`] is the table of keys, from which [`schema()`] follows.
+//! Each of these overrides what precedes it: defaults, the style, the document, the dotted keys of a
+//! query or of `--set`. Materials begin from the document's own layers, as they are after all of these.
+//! `null` turns a layer off; for any other key `null` is its default, or the same as leaving the key out.
+//! [`table`] is the table of keys, from which [`schema()`] follows.
 
 mod apply;
 mod components;

@@ -1,4 +1,6 @@
-//! A [`Sheet`] in the making.
+//! The draft of a [`Sheet`] (several views in one picture), which collects what a request says about it.
+//! When every key is known, it is checked whether the sheet goes with the camera and with the picture's
+//! size.
 
 use super::error::{RequestError, RequestFault};
 use crate::image::ImageFormat;

@@ -1,4 +1,6 @@
-//! Styles: presets of layers.
+//! The styles that a request can name, such as `wire` or `clay`, and the ambient light that each has by
+//! default. A style is a preset: it says which layers of a picture are drawn and how, and the other keys
+//! of the request override it.
 
 use crate::spec::words::word_enums;
 

@@ -1,4 +1,5 @@
-//! Suggests the nearest known keys for a misspelt one.
+//! Suggestions for misspelt keys and words of a request: the nearest known ones, for the text of an error
+//! ("did you mean ...?").
 
 /// Longest key that is compared: a longer one is no typing mistake.
 const KEY_CHARS_MAX: usize = 64;

@@ -1,4 +1,6 @@
-//! The room around a mesh that its outlines, lines and points need when the camera is fitted.
+//! The space that outlines, lines and points take around a mesh. The camera is fitted to the mesh and this space,
+//! so that the picture does not cut them off. The distance to which the ground's shadow reaches is found here, too;
+//! the camera's depth range has room for it.
 
 use super::camera::Border;
 use super::ground::ground_distance;

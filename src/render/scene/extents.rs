@@ -1,4 +1,7 @@
-//! The bounds of a mesh in the axes of a camera.
+//! The bounds of a mesh as a camera sees it, to which the camera is fitted: the least and the largest
+//! coordinates along the camera's axes, and the farthest vertices towards the four sides of the view
+//! pyramid. For a single view, blocks of vertices that cannot change the result are left out. For a
+//! turntable, the bounds are those of all its turns together.
 
 use glam::{DVec2, DVec3};
 

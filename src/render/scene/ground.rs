@@ -1,4 +1,5 @@
-//! The plane on which a mesh stands: where it is, from where it is seen, and how far its shadow reaches.
+//! The plane on which a mesh stands, for its contact shadow: where the plane is, from which cameras its
+//! upper side is seen, and how far the shadow reaches.
 
 use glam::DVec3;
 

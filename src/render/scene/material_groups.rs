@@ -1,5 +1,6 @@
-//! Material groups: the triangles, lines and points that share a material, and the style that the
-//! request gives them.
+//! Material groups: the triangles, lines and points of a mesh that share a material, and the style that
+//! the request gives them (which layers are drawn, and how). From both it follows whether a group is
+//! filled, and whether it is opaque or transparent.
 
 use rapidhash::RapidHashMap;
 

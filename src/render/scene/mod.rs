@@ -1,8 +1,8 @@
-//! A mesh and a request brought together: the placed camera and the material groups, worked out
-//! once per render.
+//! The scene of a picture: a mesh and a request brought together. It has the placed camera and the style
+//! that the request gives each material of the mesh. Both are worked out once per picture.
 //!
-//! Invariant: a scene knows nothing of the plan. It reads the mesh and the spec, and changes
-//! neither.
+//! Invariant: nothing here depends on the plan, which is made from a scene. The mesh and the request are
+//! read and never changed.
 
 mod border;
 pub mod camera;

@@ -1,9 +1,10 @@
 //! Sheets: several views of one mesh in one picture. A [`Layout`] says where each view is, [`Canvas`]
 //! puts the drawn views together and writes their names.
 //!
-//! The size of a request is that of the whole sheet, and its cells share it without a rest: the cells
-//! of a row differ in width by one pixel at most. The frames of an animation have the whole size each;
-//! until they are encoded they are one picture, from the top to the bottom.
+//! The size that a request gives is that of the whole sheet. Its cells (one for each view, and maybe
+//! empty ones in the last row) divide all of it: no pixel is left over, and the cells of a row differ in
+//! width by one pixel at most. The frames of an animation have the whole size each. Until they are
+//! encoded, they are one tall picture, from the first frame at the top to the last.
 
 use crate::caption::{TEXT_HEIGHT, dot_px, text_width_px, write};
 use crate::image::Image;

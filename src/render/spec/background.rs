@@ -1,4 +1,4 @@
-//! What is behind the mesh: a colour, or a vertical gradient between two.
+//! The background of a picture, behind the mesh: one colour, or a vertical gradient between two.
 
 use super::color::Rgba;
 

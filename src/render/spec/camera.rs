@@ -1,4 +1,5 @@
-//! The camera, as a request describes it.
+//! The camera, as a request describes it: the direction or the position to look from, the projection and
+//! the lens. It is placed for a mesh later, in `scene`.
 
 use super::words::word_enums;
 use crate::mesh::UpAxis;

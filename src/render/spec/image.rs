@@ -29,7 +29,8 @@ pub struct ImageSpec {
 pub enum Samples {
     /// 1, 4, 8 or 16.
     Fixed(u32),
-    /// 4, or 16 in pictures with something transparent, and points in pixels that show several faces.
+    /// 4, and points in pixels that show several faces. Pictures with something transparent have 16 in place of 4; those
+    /// without opaque faces have 16 and no points.
     Adaptive,
 }
 

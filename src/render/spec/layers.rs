@@ -1,5 +1,6 @@
-//! The layers that a picture consists of: surface, wire, outline, topology. A layer that is `Some`
-//! is drawn.
+//! The layers of a picture, as a request describes them: the filled surface, the wire (lines along the
+//! mesh's edges), the outline, and the topology (edges coloured by how faces are connected). A layer that
+//! is `Some` is drawn. The size of points is here, too.
 
 use super::color::Rgba;
 use super::wire_method::WireMethod;

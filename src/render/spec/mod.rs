@@ -1,5 +1,6 @@
-//! The meaning of a request: a [`Spec`] says what to draw of any mesh, and how. Every value is in
-//! range; units are in the names.
+//! The specification of a picture: a [`Spec`] is a request after it was read and checked. It says what to
+//! draw of any mesh, and how, with styles applied and defaults filled in. Every value is in range; units
+//! are in the names.
 
 mod background;
 mod camera;

@@ -1,5 +1,6 @@
-//! The table of wire methods. The words of requests, their schema, the quality selection and the
-//! accuracy benchmark follow from it; CONTRIBUTING.md lists what else a new method needs.
+//! The table of wire methods, which are the ways to draw lines along the mesh's edges. The words of
+//! requests, their schema, the quality selection and the accuracy benchmark follow from it;
+//! CONTRIBUTING.md lists what else a new method needs.
 
 use super::words::Words;
 

@@ -1,4 +1,5 @@
-//! Enumerations that a request document names by words.
+//! Enumerations whose values a request names by words, such as `perspective`. Each value is written down
+//! once beside its word; the reader of requests, its error messages and the schema use this list.
 
 use crate::image::ImageFormat;
 use crate::mesh::UpAxis;

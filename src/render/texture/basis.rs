@@ -1,4 +1,4 @@
-//! KTX2 files with Basis Universal data, as KHR_texture_basisu has them: the largest image,
+//! KTX2 files with Basis Universal data, as the glTF extension KHR_texture_basisu has them: the largest image,
 //! transcoded to RGBA.
 //!
 //! Offsets and field names are those of the KTX File Format, version 2.0, section 3

@@ -1,8 +1,9 @@
-//! Encoded images to rows of linear texels.
+//! The decoding of texture images (PNG, JPEG, WebP and others): from the bytes of a file to rows of
+//! linear texels.
 //!
-//! A decoder cannot be stopped midway. Its time is bounded by the pixels that the budget allows and
-//! by the input's length: PNG, WebP and baseline JPEG are read once. A progressive JPEG's scans go
-//! over all pixels again, and zune-jpeg refuses more than 100 scans.
+//! A decoder cannot be stopped midway. Its time is bounded by the pixels that the budget allows and by
+//! the input's length: PNG, WebP and baseline JPEG are read once. A progressive JPEG's scans go over all
+//! pixels again, and zune-jpeg refuses more than 100 scans.
 
 use std::io::{BufRead, Cursor, Seek};
 

@@ -1,5 +1,4 @@
-//! The finest level that is kept of each texture, so that all textures of a picture fit into one
-//! buffer.
+//! The finest mip level that is kept of each texture, so that all textures of a picture fit into one buffer.
 //!
 //! Together they have at most [`TEXELS_MAX`] texels. While they have more, the largest texture
 //! loses its finest level.

@@ -1,5 +1,6 @@
-//! Decoded images of one mesh, kept from picture to picture. Looks that sample different images each find
-//! theirs.
+//! The decoded images of one mesh, kept in memory from picture to picture, so that they are not decoded
+//! again. Images are kept one by one, since the pictures of a mesh may sample different ones. Where they
+//! take too much memory, the least recently used go first.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};

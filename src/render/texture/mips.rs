@@ -1,4 +1,6 @@
-//! Mip levels. A texel of the next level is the mean of the area that it covers, in linear light.
+//! The making of mip levels: smaller copies of an image, each about half as wide and high as the one before, from
+//! which back-ends read textures that are far away. A texel of a level is the mean of the area that it covers, in
+//! linear light.
 //!
 //! Colours are weighted by alpha, so that the colour of transparent texels does not bleed into
 //! their neighbours.

@@ -7,15 +7,15 @@
 //! - [`decode`]: an image's header, then its pixels. The `image` crate decodes PNG, JPEG, WebP, BMP, TGA and
 //!   DDS.
 //! - [`basis`]: KTX2 files with Basis Universal data.
-//! - [`png`]: drops a PNG's ancillary chunks before the decoder reads them.
+//! - [`png`]: drops the chunks of a PNG that its pixels do not need, before the decoder reads them.
 //! - [`mips`]: makes the levels of one image.
 //! - [`cut_out`]: the distance of texels from the border of what is cut out.
 //! - [`fit`]: chooses the finest level of each image, so that all textures of a picture fit.
 //! - [`kept`]: a mesh's decoded images, from one picture to the next.
 //!
-//! Memory is paid for first. A header says how much decoding takes, the caller spends that from the
-//! job's budget, and only then are pixels decoded. The plan decides which images a picture needs
-//! and how close it comes to each.
+//! Memory is taken from the job's budget first. A header says how much decoding takes, the caller takes that from
+//! the budget, and only then are pixels decoded. The plan decides which images a picture needs and how close it
+//! comes to each.
 //!
 //! **Invariant**: the encoding is sniffed from the bytes. A file name or a declared type is not
 //! trusted.

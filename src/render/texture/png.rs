@@ -1,4 +1,5 @@
-//! A reader that drops a PNG's ancillary chunks.
+//! A reader that drops a PNG's ancillary chunks, except `tRNS` (transparency), the one that changes pixels. The
+//! decoder of textures reads PNG files through it.
 //!
 //! A colour profile or a text chunk may be large, or inflate to any size, and decoders read them
 //! before the first row. Textures need neither. Dropped here, they cost nothing and cannot fail an

@@ -1,5 +1,5 @@
-//! Finds out whether this machine can have a hardware GPU, from its device nodes and without
-//! loading a driver.
+//! A test whether this machine can have a hardware GPU. It looks at the device nodes under `/dev` (Linux only; elsewhere
+//! the answer is yes), so that no driver is loaded for it.
 
 use std::path::Path;
 

@@ -1,8 +1,7 @@
-//! The settings of `serve`. Each is a flag, an environment variable `MESHSNAP_*` and a key of the
-//! TOML file, under one name. A flag overrides a variable, which overrides the file, which
-//! overrides the default.
+//! The settings of `serve`. Each is a flag (secrets have none), an environment variable `MESHSNAP_*` and a key of the
+//! TOML file, under one name. A flag overrides a variable, which overrides the file, which overrides the default.
 //!
-//! A new setting is a field of [`Config`], its default, and one line of [`SETTINGS`].
+//! A new setting is a field of [`Config`], its default, and one row of [`SETTINGS`].
 
 mod hardware;
 mod memory;

@@ -1,4 +1,5 @@
-//! Files by their SHA-256.
+//! The files of the data folder, for bytes that are too large for its database (`log`), such as meshes and pictures.
+//! Each file is named by the SHA-256 of its bytes.
 
 use std::io;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,9 @@
-//! The thread that writes. What arrives while the disk works shares the next transaction (group
-//! commit), so that the rate of acceptance does not depend on the time of one sync.
+//! The thread that writes the database of the data folder (`log`), and removes stored bytes that no record needs any
+//! more.
+//!
+//! Changes that arrive while the disk works are written together in the next transaction (group commit). One sync of
+//! the disk then stores the changes of many jobs, so that slow syncs hardly limit how many jobs are accepted per
+//! second.
 
 use std::collections::HashSet;
 use std::sync::Arc;

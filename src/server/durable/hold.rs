@@ -1,4 +1,7 @@
-//! What keeps bytes in the data folder: holds, and the index of those that exist.
+//! Holds: counted references to bytes in the data folder, which are named by their SHA-256. The records of jobs and
+//! meshes that need the same bytes share one hold. When its last reference is dropped, the bytes are removed.
+//!
+//! `Index` finds the hold that exists for given bytes, so that equal bytes are stored once.
 
 use std::collections::HashMap;
 use std::fmt;

@@ -1,4 +1,9 @@
-//! The transactional log of jobs and meshes.
+//! The database of the data folder (redb, a key-value database), which the code calls its log. It has the records of
+//! jobs and of stored meshes. Of the bytes that these need (meshes, pictures, documents), it has those that are small;
+//! larger ones are files (`blobs`).
+//!
+//! Changes are made in transactions, each whole or not at all. The thread `committer` writes them. When the server
+//! starts, it reads the database to restore jobs and meshes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -19,6 +24,8 @@ pub trait Log: Send {
     fn load(&mut self) -> io::Result<Contents>;
     /// Bytes that are kept in the log.
     fn small(&mut self, digest: Digest) -> io::Result<Option<Bytes>>;
+    /// The names of all bytes that are kept in the log.
+    fn small_digests(&mut self) -> io::Result<Vec<Digest>>;
     /// Makes all the changes, durably, or none of them.
     fn commit(&mut self, changes: &[Change]) -> io::Result<()>;
 }
@@ -65,7 +72,8 @@ impl Contents {
             match &job.end {
                 Some(end) => all.extend(end.picture.as_ref().map(|picture| picture.digest)),
                 None => {
-                    all.extend(job.record.files.iter().map(|file| file.digest));
+                    let newer = job.record.newer.iter().flat_map(|newer| &newer.files);
+                    all.extend(job.record.files.iter().chain(newer).map(|file| file.digest));
                     all.extend(job.record.request.document);
                 }
             }
@@ -178,6 +186,13 @@ impl Log for RedbLog {
         self.run(|database| {
             let small = database.begin_read()?.open_table(SMALL)?;
             Ok(small.get(digest.as_bytes())?.map(|bytes| Bytes::copy_from_slice(bytes.value())))
+        })
+    }
+
+    fn small_digests(&mut self) -> io::Result<Vec<Digest>> {
+        self.run(|database| {
+            let small = database.begin_read()?.open_table(SMALL)?;
+            small.iter()?.map(|row| Ok(Digest::from_bytes(row?.0.value()))).collect()
         })
     }
 

@@ -1,11 +1,12 @@
-//! The data folder: what outlives the process. Jobs and the records of meshes are in a transactional
-//! log ([`log`]), the bytes that they need in content-addressed files ([`blobs`]).
+//! The data folder: what outlives the process. The records of jobs and meshes are in a database ([`log`]). The bytes
+//! that they need are named by their SHA-256: small ones are in the database, too, larger ones in files ([`blobs`]).
 //!
-//! One thread writes ([`committer`]): what arrives while it waits for the disk shares its next
-//! transaction. Bytes belong to records through a [`Hold`]: when the last one is dropped, they go.
+//! One thread writes the database ([`committer`]): changes that arrive while it waits for the disk share its next
+//! transaction. A [`Hold`] is a counted reference of records to bytes: when the last one is dropped, the bytes are
+//! removed.
 //!
-//! Architecture invariants: what [`Durable::store`] has answered with Ok survives a crash at any
-//! instant. Nothing here knows what a job does, nor HTTP.
+//! Architecture invariants: what [`Durable::store`] has answered with Ok survives a crash at any instant. Nothing here
+//! knows what a job does, nor HTTP.
 
 mod blobs;
 mod committer;
@@ -25,7 +26,7 @@ pub use record::{
 pub use record::{RequestKind, RequestRecord, SelectionRecord, SideRecord, WarningRecord};
 pub use snapshot::read;
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -175,7 +176,7 @@ impl Durable {
                 found.insert(digest, (bytes, index.hold_stored(digest, is_small, &on_drop)));
             }
         }
-        sweep(&*blobs, &found)?;
+        sweep(&mut *log, &*blobs, &found)?;
         let (writer_blobs, writer_index, health) = (blobs.clone(), index.clone(), Arc::new(Health::default()));
         let writer_health = health.clone();
         let committer = std::thread::Builder::new().name("committer".into()).spawn(move || {
@@ -258,13 +259,15 @@ impl Durable {
     }
 }
 
-/// Removes files that no record names: a crash came between the file and its record.
-fn sweep(blobs: &dyn Blobs, found: &HashMap<Digest, (Bytes, Arc<Hold>)>) -> io::Result<()> {
-    let known: HashSet<Digest> = found.keys().copied().collect();
-    for digest in blobs.list()?.into_iter().filter(|digest| !known.contains(digest)) {
+/// Removes bytes that no record names: a crash came between the bytes and their record, or between the end of a record
+/// and the removal of its bytes.
+fn sweep(log: &mut dyn Log, blobs: &dyn Blobs, found: &HashMap<Digest, (Bytes, Arc<Hold>)>) -> io::Result<()> {
+    let is_unnamed = |digest: &Digest| !found.contains_key(digest);
+    for digest in blobs.list()?.into_iter().filter(is_unnamed) {
         blobs.delete(digest)?;
     }
-    Ok(())
+    let small: Vec<Change> = log.small_digests()?.into_iter().filter(is_unnamed).map(Change::SmallRemoved).collect();
+    log.commit(&small)
 }
 
 /// The error for the client. The cause is in the log.

@@ -1,5 +1,6 @@
-//! What is written to the log: records, and the changes that make and remove them. Their JSON is the
-//! format of the data folder: fields are added with a default, and never change their meaning.
+//! The records in the database of the data folder (jobs, their ends, stored meshes), and the changes that make and
+//! remove them. Their JSON is the format of the data folder: fields are added with a default, and never change their
+//! meaning.
 
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};

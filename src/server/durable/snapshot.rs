@@ -1,7 +1,8 @@
-//! The content of a data folder that a server may be using: what `meshsnap jobs` lists.
+//! The reading of a data folder that a server may be using: its jobs and meshes, for `meshsnap jobs`.
 //!
-//! The log is copied into memory, and the copy is opened. Commits go on meanwhile, so a copy can have parts of several
-//! states. redb checks every page of it, and a copy that is none of a single state is made anew.
+//! The database of the folder is copied into memory, and the copy is opened. The server may write meanwhile, so a copy
+//! can mix several states of the database. redb checks every page of the copy. If it finds a mix, the database is
+//! copied anew.
 
 use std::fs::File;
 use std::io::{self, Read as _};

@@ -338,6 +338,28 @@ fn bytes_stay_as_long_as_somebody_holds_them() {
     drop(again);
 }
 
+/// A crash may come between the end of a record and the removal of its bytes.
+#[test]
+fn small_bytes_that_no_record_names_go_at_the_next_start() {
+    let disk = Disk::new();
+    let (named, other, compared) = (Bytes::from("named"), Bytes::from("other"), Bytes::from("compared"));
+    let mut record = job(7, &named);
+    let files = vec![FileRecord { path: "b".into(), digest: Digest::of(&compared) }];
+    record.newer = Some(SideRecord { files, is_zip: false, mesh: None });
+    let stored = [named, other, compared].map(|bytes| Change::SmallStored(Digest::of(&bytes), bytes));
+    disk.log().unwrap().commit(&[&stored[..], &[Change::Accepted(Box::new(record))]].concat()).unwrap();
+    let (durable, recovered) = Durable::on(Box::new(disk.log().unwrap()), Arc::new(Shelf::default())).unwrap();
+    assert!(recovered.bytes(Digest::of(b"compared")).is_some(), "a job compares two meshes");
+    drop(recovered);
+    durable.close();
+    drop(durable);
+    let mut left = disk.log().unwrap().small_digests().unwrap();
+    left.sort_unstable();
+    let mut expected = [Digest::of(b"named"), Digest::of(b"compared")];
+    expected.sort_unstable();
+    assert_eq!(left, expected);
+}
+
 #[test]
 fn a_folder_is_opened_by_one_process_and_keeps_files_by_their_names() {
     let folder = tempfile::tempdir().unwrap();
@@ -386,6 +408,9 @@ impl Log for Counted {
     }
     fn small(&mut self, digest: Digest) -> io::Result<Option<Bytes>> {
         self.log.small(digest)
+    }
+    fn small_digests(&mut self) -> io::Result<Vec<Digest>> {
+        self.log.small_digests()
     }
     fn commit(&mut self, changes: &[Change]) -> io::Result<()> {
         self.commits.fetch_add(1, Ordering::Relaxed);

@@ -1,8 +1,11 @@
-//! The only map from errors to HTTP statuses.
+//! The map from errors to HTTP statuses. Handlers name the kind of an error ([`ErrorKind`]), and its status follows from
+//! that here.
 //!
-//! Handlers name the kind of an error ([`ErrorKind`]), never a status. An [`ApiError`] becomes an answer in
-//! two steps: status and headers here, the body in [`super::middleware::observe`], because the
-//! request's id is only known there.
+//! An [`ApiError`] becomes an answer in two steps: status and headers here, the body in
+//! [`super::middleware::observe`], because an `ApiError` does not know the id of its request, which is in the body.
+//!
+//! Two statuses are written elsewhere. The 422 of a failed verdict is an answer and no error: `resources/responses.rs`
+//! sets it. The 503 for a connection too many is sent before a request is read, by `connection/accept.rs`.
 
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};

@@ -1,4 +1,5 @@
-//! The event streams that are open: few for each client, and none when the server ends.
+//! The count of open event streams (`GET /v1/jobs/{id}/events`). A client may have a few at a time. All are ended when the
+//! server ends, so that it does not wait for them.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

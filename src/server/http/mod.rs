@@ -10,8 +10,9 @@
 //!
 //! [`recovery`] takes over what an earlier process has left in the data folder.
 //! [`negotiate`] and [`conditional`] read and write single headers. [`stored_mesh`] and [`address`]
-//! serve the resources of stored meshes. [`event_streams`] counts the clients that follow jobs, [`hear_of_ends`] tells webhooks of their ends.
-//! [`static_document`] answers with a constant document, [`descriptions`] are two of them.
+//! serve the resources of stored meshes. [`event_streams`] counts the clients that follow jobs, [`hear_of_ends`] tells
+//! webhooks of the ends of jobs. [`static_document`] answers with a document that does not change; [`descriptions`] makes
+//! two of them. `signals` hears of the signals that end the server.
 //!
 //! Architecture invariant: axum and hyper are used nowhere else.
 

@@ -1,4 +1,5 @@
-//! The signals that ask the server to end, and one that does not.
+//! The signals that the server obeys. SIGTERM and SIGINT (elsewhere than on Unix, Ctrl-C) ask it to end. SIGHUP asks it to
+//! read the file of API keys again.
 
 use std::io;
 

@@ -1,4 +1,5 @@
-//! The state that all handlers share.
+//! The state that all handlers share: the job queue, stored meshes, caches, API keys and limits. It is built from the
+//! settings when the server starts, and building it starts the workers.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};

@@ -1,4 +1,5 @@
-//! Documents that stay the same while the process runs.
+//! A document that stays the same while the process runs, such as the JSON Schema. It is sent with its `ETag`; a client
+//! that has it already gets 304.
 
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};

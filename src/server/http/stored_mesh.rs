@@ -1,4 +1,4 @@
-//! Stored meshes, as the handlers use them: found by the name in a path, and turned into work.
+//! Stored meshes, as the handlers use them: found by the digest in a path, and made into the work of a job.
 
 use std::sync::Arc;
 

@@ -1,4 +1,6 @@
-//! Whose job it is, and how it waits.
+//! The owner of a job and its class, by which the queue decides what is next. The owner is an API key, or the client's
+//! address where there are no keys. The class is interactive (a client waits for the answer) or batch (it is fetched
+//! later).
 
 use std::fmt;
 use std::sync::Arc;

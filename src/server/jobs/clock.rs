@@ -1,5 +1,7 @@
-//! The thread that ends overdue jobs, replaces overdue workers, and drops expired results. It sleeps until the next of
-//! these.
+//! The thread that ends jobs whose time is up, and drops expired results. A worker that still has not stopped after a
+//! grace is reported, and another is started in its place unless too many are stuck.
+//!
+//! `JobRegistry::wait_for_late` decides what is late. It sleeps until something is, and drops expired results meanwhile.
 
 use std::sync::Arc;
 

@@ -1,4 +1,6 @@
-//! Jobs on their way to workers: which is next, and the memory with which it begins.
+//! The hand-over of jobs to workers. `take` waits for the next job of the queue, and for the memory that it is expected to
+//! need. `again` queues a job once more that found too little memory while it ran: it then begins with the most that a
+//! job may take.
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, MutexGuard, PoisonError};

@@ -1,8 +1,9 @@
-//! Estimates of how long jobs take, learnt from the jobs that have ended.
+//! Estimates of the time and the memory that jobs take, learnt from earlier jobs.
 //!
-//! An estimate is a formula of the job's size (bytes that are to be read, and samples), times a factor. There
-//! is a factor for each kind of job, and one for each kind of job on a stored mesh that was drawn before:
-//! such a mesh is asked for again and again, and its size in bytes says little about what it takes.
+//! An estimate is a formula of the job's size (bytes that are to be read, and samples that are to be drawn), times a
+//! factor. There is a factor for each kind of job: its task, its back-end, and whether its mesh was drawn before. For the
+//! time, there is also one for each kind of job on a stored mesh that was drawn before: such a mesh is asked for again and
+//! again, and its size in bytes says little about what it takes.
 
 use std::hash::{BuildHasher as _, RandomState};
 use std::sync::{Mutex, PoisonError};

@@ -1,4 +1,5 @@
-//! One job: its work, its state and its result.
+//! One job: its work (a mesh and a task on it: draw, check, compare or report), its state from the queue to its end, and
+//! its result.
 
 use std::fmt;
 use std::sync::atomic::AtomicU64;

@@ -1,4 +1,5 @@
-//! How far a job has come, for those who watch it.
+//! The progress of a job, for clients that follow its events: the step that it is at (waiting, reading the mesh, drawing,
+//! encoding), and how many of its views are drawn.
 
 use meshsnap_render::pipeline::Stage;
 

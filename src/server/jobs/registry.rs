@@ -3,12 +3,11 @@
 //! One lock guards them all, because a job may be cancelled at the moment in which a worker takes
 //! it. The lock is held for microseconds, and a render takes milliseconds.
 //!
-//! The queue is not a channel, because a cancelled or overdue job must leave it at once and free
-//! its place and its memory.
+//! The queue is not a channel, because a cancelled job must leave it at once and free its place and its memory.
 //!
 //! Waiting and running are timed apart. A job's time begins when a worker begins it, so that no job fails because
-//! it has waited. A job that would wait for too long is refused when it comes, with the time after which it would
-//! not.
+//! it has waited. A job that would wait for too long is refused when it comes. The refusal says after how many seconds to
+//! try again.
 //!
 //! Short jobs overtake long ones of the same owner: a job ranks as if it had been accepted later by [`PATIENCE`]
 //! times its estimate, at most a quarter of the time that a job may take. So what is accepted later than that

@@ -1,4 +1,5 @@
-//! Jobs in the data folder: what is written of them, and how they are read again.
+//! The form of jobs in the data folder: it makes records of accepted jobs and of their ends, and reads stored results
+//! again. `http/recovery.rs` makes jobs of the records after a restart.
 
 use std::collections::HashSet;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};

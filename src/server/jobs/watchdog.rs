@@ -1,6 +1,12 @@
 //! Workers that do not stop when the time of their job is up: a bug keeps them busy, and nothing can end a thread from
-//! outside. After a grace such a worker is reported and another takes its place; it ends itself if its job ever does.
-//! A mesh that did this twice is not drawn again.
+//! outside.
+//!
+//! After a grace such a worker is reported, and another takes its place, unless the number of stuck ones is more than
+//! twice that of workers in the settings. If its job ends after all, the worker ends itself, or goes on in the place
+//! of a stuck one that was not replaced.
+//!
+//! A mesh that has kept a worker busy in this way twice is refused from then on. The last 1024 meshes that have done
+//! so at least once are remembered.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -86,6 +92,7 @@ impl Quarantine {
         let (digest, bytes, last) = (digest(bundle), bundle.bytes_len(), Instant::now());
         let mut meshes = self.lock();
         if meshes.len() >= MESHES_MAX
+            && !meshes.contains_key(&digest)
             && let Some(oldest) = meshes.iter().min_by_key(|(_, entry)| entry.last).map(|(digest, _)| *digest)
         {
             meshes.remove(&oldest);
@@ -122,5 +129,22 @@ fn digest(bundle: &Bundle) -> Digest {
     match bundle.files() {
         [one] => Digest::of(&one.bytes),
         files => Digest::of_files(files),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strikes_of_a_mesh_add_up_where_all_places_are_taken() {
+        let quarantine = Quarantine::default();
+        let mesh = |i: usize| Bundle::of_one(i.to_string().into_bytes());
+        for i in 0..MESHES_MAX {
+            assert_eq!(quarantine.strike(&mesh(i)).1, 1);
+        }
+        assert_eq!(quarantine.strike(&mesh(0)).1, 2, "the oldest one");
+        assert_eq!(quarantine.strike(&mesh(MESHES_MAX)).1, 1, "a new one, which takes the place of another");
+        assert_eq!(quarantine.strike(&mesh(0)).1, 3);
     }
 }

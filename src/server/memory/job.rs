@@ -1,4 +1,5 @@
-//! The memory of one running job.
+//! The memory of one running job: what it has borrowed from the budget of the process, and the most that it held. A job
+//! that finds no more gives all of it back and is queued again, so that no job waits for memory while it holds some.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

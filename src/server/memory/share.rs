@@ -1,4 +1,5 @@
-//! Shares of the budget, each given back when it is dropped.
+//! Shares of the memory budget. A share counts the bytes of something on one account (uploads, results, answers ...) and
+//! is kept beside these bytes. When it is dropped, the memory is free again.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -1,5 +1,6 @@
-//! Pictures of stored meshes that were drawn before, kept in memory under their render keys. Requests
-//! for a picture that is being drawn wait for it.
+//! The cache of answers in memory: pictures of stored meshes, verdicts and differences. The key of an answer is a
+//! digest of all that decides it (for a picture it is also its `ETag`). Where the same answer is already being made
+//! for another request, a request waits for it.
 
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,5 @@
-//! The log on standard error: text on a terminal, one JSON object per line elsewhere. With the feature `otel`, [`traces`]
-//! for OpenTelemetry as well.
+//! The log on standard error: by default, text on a terminal and one JSON object per line elsewhere. With the feature
+//! `otel`, [`traces`] for OpenTelemetry as well.
 
 #[cfg_attr(not(feature = "otel"), path = "traces_absent.rs")]
 pub mod traces;

@@ -1,8 +1,8 @@
 //! Traces for OpenTelemetry: a span for each request, one for its job below it, and one for each stage of the job.
 //!
-//! They are sent by OTLP over HTTP, in batches, from a thread of their own. The variables of the OpenTelemetry specification say
-//! where to, how many, and under which name: `OTEL_EXPORTER_OTLP_ENDPOINT`, `OTEL_TRACES_SAMPLER`, `OTEL_SERVICE_NAME`
-//! and so on. Without an address, nothing is measured.
+//! They are sent by OTLP over HTTP, in batches, from a thread of their own. The variables of the OpenTelemetry
+//! specification set the address, the share of traces that is sent, and the service's name: `OTEL_EXPORTER_OTLP_ENDPOINT`,
+//! `OTEL_TRACES_SAMPLER`, `OTEL_SERVICE_NAME` and so on. Without an address, no trace is made.
 //!
 //! `traces_absent.rs` stands in where the feature `otel` is left out.
 

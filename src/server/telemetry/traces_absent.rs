@@ -1,4 +1,4 @@
-//! Stands in for `traces.rs` where the feature `otel` is left out: nothing is traced.
+//! The stand-in for `traces.rs` in builds without the feature `otel`: the same functions, which trace nothing.
 
 use std::time::Instant;
 

@@ -1,4 +1,5 @@
-//! One attempt to deliver.
+//! One attempt to deliver a webhook: a signed POST, and what its outcome means (delivered, to be tried again, or in vain).
+//! A name that has only addresses of private networks is refused here, unless these are allowed.
 
 use std::io;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};

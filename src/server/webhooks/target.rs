@@ -1,4 +1,5 @@
-//! Addresses to which webhooks may be sent.
+//! Addresses to which webhooks may be sent: http or https, without user and password. Those of private networks are
+//! refused unless that is allowed.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use std::sync::Arc;

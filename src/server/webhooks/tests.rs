@@ -125,8 +125,9 @@ fn receiver(statuses: &'static [&'static str]) -> (String, Receiver<String>) {
                 assert!(count > 0, "{}", String::from_utf8_lossy(&text));
                 text.extend(&buffer[..count]);
             }
-            write!(stream, "HTTP/1.1 {status}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n").unwrap();
+            // Before the answer: what is settled has been received.
             sender.send(String::from_utf8(text).unwrap()).unwrap();
+            write!(stream, "HTTP/1.1 {status}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n").unwrap();
         }
     });
     (address, got)

@@ -1,9 +1,9 @@
-//! FLIP: the difference between two pictures that a person sees who looks at one and then at the other in its place,
-//! from 0, none, to 1, black and white. The algorithm is that of Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström
-//! and Fairchild, FLIP: A Difference Evaluator for Alternating Images (High Performance Graphics 2020), for pictures of
-//! low dynamic range; names of constants are those of the paper.
+//! FLIP: a measure of the difference that a person sees when one picture is shown and then the other in its place. It
+//! goes from 0, no difference, to 1, the largest. The algorithm is that of Andersson, Nilsson, Akenine-Möller,
+//! Oskarsson, Åström and Fairchild, FLIP: A Difference Evaluator for Alternating Images (High Performance Graphics
+//! 2020), for pictures of low dynamic range; names of constants are those of the paper.
 //!
-//! A picture is looked at from 0.7 m on a screen of 0.7 m and 3840 pixels across, as in the paper.
+//! A picture is taken to be looked at from 0.7 m, on a screen that is 0.7 m and 3840 pixels wide, as in the paper.
 
 use super::Picture;
 use meshsnap_render::parallel::map;

@@ -1,4 +1,6 @@
-//! Differences between two pictures, pixel by pixel, and to the eye.
+//! The differences between two pictures (PNG, WebP or JPEG), for `meshsnap diff` and for reports of `meshsnap check`:
+//! how many pixels differ and by how much, and how large the difference is for the eye of a person (FLIP). Also the
+//! pictures that show in colour where two pictures differ.
 
 mod flip;
 #[cfg(test)]

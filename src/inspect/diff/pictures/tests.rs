@@ -1,4 +1,5 @@
-//! Pictures whose differences are known.
+//! Tests of the comparison of pictures, on pictures whose differences are known. FLIP is compared with the figures
+//! that the program of its authors gives.
 
 use super::*;
 

@@ -1,5 +1,5 @@
-//! The part of a triangle that others leave uncovered, as convex polygons: each triangle that is taken away
-//! cuts the polygons along the lines of its edges.
+//! The part of a triangle that other triangles do not cover, for the area of overlaps in a texture. It is kept as a
+//! list of convex polygons: each triangle that is taken away cuts the polygons along the lines of its edges.
 
 use super::Uv;
 

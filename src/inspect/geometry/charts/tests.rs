@@ -1,5 +1,5 @@
-//! Charts, stretch and overlaps against closed forms, and against an integration by strips that shares no code
-//! with them.
+//! Tests of charts, stretch and overlaps against closed forms. Areas of overlaps are also compared with an
+//! integration by strips that shares no code with them.
 
 use std::f64::consts::{PI, TAU};
 

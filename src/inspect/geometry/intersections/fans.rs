@@ -1,6 +1,10 @@
-//! Fans: many faces around one vertex, their apex. The boxes of all faces of a fan overlap there, so that a tree of
-//! boxes would find all of its pairs. They are told apart by their directions from the apex instead: two faces that
-//! have another point in common than the apex are met by one ray from it.
+//! Fans: 64 faces or more around one vertex, the apex. The boxes of all faces of a fan overlap at the apex, so that
+//! the tree of boxes of the mesh would find all of their pairs, whose number grows with the square of that of the
+//! faces.
+//!
+//! Each fan therefore has a tree of its own, of the directions from the apex to the points of each face. If two faces
+//! have another point in common than the apex, one ray from the apex meets both. So faces whose directions do not
+//! overlap need not be compared.
 
 use super::tree::{Aabb, Tree};
 use meshsnap_render::limits::{Budget, Deadline, Exhausted};

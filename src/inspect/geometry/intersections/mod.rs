@@ -1,12 +1,13 @@
 //! Faces that intersect each other, and vertices that lie on edges of other faces (T-junctions).
 //!
-//! Two faces intersect if they have a point in common that does not belong to the corners or the
-//! edge that they share. So these count: crossing, overlap in one plane, a corner that touches a
-//! face or an edge of another. These do not: a common corner, a common edge, and a face that repeats
-//! another. Faces without area in the mesh's own f32 positions take no part.
+//! Two faces intersect if they have a point in common that does not belong to the corners or the edge that they
+//! share. So these count: crossing, overlap in one plane, a corner that touches a face or an edge of another. These
+//! do not: a common corner, a common edge, and a face that repeats another. Faces without area in the mesh's own f32
+//! positions take no part.
 //!
-//! All decisions are exact on these positions: `orient` and [`robust`] give the signs. [`Tree`] finds the pairs
-//! whose boxes overlap; those of [`fans`] it finds by their directions from the apex. The results depend neither on the order of work nor on the number of threads.
+//! All decisions are exact on these positions: `orient` and [`robust`] give the signs. [`Tree`] finds the pairs of
+//! faces whose boxes overlap. Pairs of many faces around one vertex ([`fans`]) are found by a tree of the directions
+//! from that vertex. The results depend neither on the order of work nor on the number of threads.
 
 mod fans;
 mod orient;

@@ -1,5 +1,5 @@
-//! The side of a plane that a point lies on, exactly: by floating point where that is sure of the sign, by integers
-//! where coordinates fit, and by [`robust`] where neither is.
+//! The side of a plane on which a point lies, exactly: by floating point where rounding cannot change the sign, else
+//! by integers where the coordinates fit, else by the crate [`robust`].
 
 use robust::{Coord3D, orient3d};
 

@@ -1,4 +1,5 @@
-//! Decides of two faces whether they intersect, and of a vertex whether it lies on an edge.
+//! The test whether two faces intersect, and the test whether a vertex lies on an edge. Both are exact. Points that
+//! belong to the corners or the edge that two faces share are no intersection.
 
 use super::Point;
 use super::orient::orient;

@@ -1,4 +1,5 @@
-//! Segments and triangles in a plane.
+//! Exact tests in two dimensions, after points were projected along an axis: the side of a line on which a point
+//! lies, and whether a segment and a triangle of one plane have a point in common.
 
 use robust::{Coord, orient2d};
 

@@ -1,4 +1,5 @@
-//! Contacts whose numbers are known, the budget, the deadline, and threads.
+//! Tests of the search for intersections: contacts of faces whose number is known, fans (many faces around one
+//! vertex), the limit of memory, the deadline, and equal results with any number of threads.
 
 use super::*;
 use meshsnap_render::limits::Limits;

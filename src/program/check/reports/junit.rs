@@ -1,4 +1,4 @@
-//! Verdicts as JUnit XML: a suite for each file, a case for each rule.
+//! The report of `meshsnap check` as JUnit XML, which CI systems read: a suite for each file, a case for each rule.
 
 use std::fmt::Write as _;
 

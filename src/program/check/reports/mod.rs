@@ -1,6 +1,7 @@
-//! The verdicts as files: a module for each kind of report.
+//! The reports of `meshsnap check` that are written to files, as JUnit XML, SARIF, Markdown, HTML or JSON Lines. All
+//! are made of the same verdicts, the results of the files.
 //!
-//! Equal verdicts make equal bytes: no report has a time, a duration or the name of the machine.
+//! Equal verdicts make equal bytes: no report has the time of the run, its duration or the name of the machine.
 
 mod html;
 mod junit;

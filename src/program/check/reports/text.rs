@@ -1,4 +1,5 @@
-//! Verdicts for people.
+//! Verdicts of `meshsnap check` as text for a person: a line for a file, then a line for each rule that it breaks,
+//! with the first places of the fault, and a line for each change.
 
 use std::fmt::Write as _;
 

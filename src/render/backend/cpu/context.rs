@@ -1,4 +1,5 @@
-//! The input of every stage: the plan, what earlier stages have found, and the vertices on screen.
+//! The input that all stages of the CPU rasterizer share: the plan (what to draw), the vertices on screen, and
+//! results for the whole picture, such as the colours of faces and how much darker hollows are.
 
 use std::ops::Range;
 

@@ -1,4 +1,5 @@
-//! Every stage with a loop over triangles: polling of the deadline.
+//! Checks, in loops over triangles and the like, whether a job's time is up. The next check follows after a certain
+//! amount of work, about 10 ms, because a triangle may have one sample or millions.
 
 use crate::limits::Deadline;
 

@@ -1,10 +1,10 @@
-//! The CPU rasterizer: the reference for bytes.
+//! The CPU rasterizer, which draws plans without a GPU. Its pictures are the reference: tests compare their bytes
+//! with stored pictures. A picture of the GPU may differ from them by one step in 255, in a few pixels.
 //!
-//! Stages in order: transform and visibility in `geometry`, then `occlusion`, `peeling`, shade in
-//! `surface`, `mixed`, `lines`, `resolve`. `context` holds the input of each. Transform and occlusion
-//! look at the whole picture. `bands` runs the others: the picture is cut into bands of rows that fit
-//! a core's cache, threads take bands, and no band depends on another. The hot loops are compiled
-//! once per instruction set (`isa`).
+//! Stages in order: transform and visibility in `geometry`, then `occlusion`, `peeling`, shade in `surface`, `mixed`,
+//! `lines`, `resolve`. `context` holds the input that they share. Transform and occlusion look at the whole picture.
+//! `bands` runs the others: the picture is cut into bands of rows that fit a core's cache, threads take bands, and no
+//! band depends on another. The hot loops are compiled for several instruction sets (`isa`).
 //!
 //! **Invariant:** threads and instruction sets do not change a byte.
 

@@ -1,5 +1,5 @@
-//! Stage resolve, per pixel: surface over background, where no line has composited both, to sRGB
-//! bytes. Twin of `shaders/resolve.wgsl`.
+//! The last stage (resolve), per pixel: it lays the surface's colour over the background, unless lines have been
+//! drawn over both already, and makes sRGB bytes of it. Twin of `shaders/resolve.wgsl`.
 
 use crate::backend::cpu::geometry::transform::recip;
 use crate::backend::cpu::isa::{LANES, dispatch};

@@ -1,4 +1,5 @@
-//! Hands finished bands to a [`RowSink`] in their order, while others are being drawn.
+//! The queue of finished bands (ranges of pixel rows): it gives them to a [`RowSink`], such as an encoder, from the
+//! top down, while other bands are still being drawn.
 
 use std::sync::{Mutex, PoisonError, TryLockError};
 

@@ -1,4 +1,5 @@
-//! Times the stages of a picture. Nothing that is drawn depends on them.
+//! The measuring of how long each stage of a picture takes, for reports. Nothing that is drawn depends on these
+//! times.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};

@@ -1,8 +1,8 @@
-//! Threads that the renderers of a process share.
+//! The threads that draw on the CPU, shared by all renderers that are given them.
 //!
-//! A picture that is drawn alone uses all of them. `n` pictures at once use `count / n` each; where
-//! that is less than 2, a picture is drawn on its caller's thread. A picture gives up threads
-//! between two bands when another one begins, and gets none back.
+//! A picture that is drawn alone uses all of them. `n` pictures at once use one n-th of them each; where that is less
+//! than 2 threads, a picture is drawn on its caller's thread. A picture gives up threads when another one begins,
+//! after the bands (ranges of rows) that they are drawing, and gets none back.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};

@@ -1,4 +1,6 @@
-//! A job's GPU buffers, kept for the jobs that follow.
+//! The GPU buffers in which one job is drawn (a job draws one picture): its input, what the stages compute, and the
+//! picture's bytes. When the job is done, the whole set of buffers is kept for a later job, because allocating
+//! buffers anew takes time. How much memory the kept sets may take is limited.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

@@ -1,4 +1,8 @@
-//! One opened GPU: adapter, device, queue, and what it can do. Shared by all workers.
+//! One opened GPU, shared by all threads that draw on it: the wgpu device and queue, the features that it has, its
+//! compiled pipelines, and the memory that it keeps for the next pictures.
+//!
+//! This file chooses and opens the adapter, makes the pipelines that a picture needs, waits for the GPU, and turns
+//! its errors, and the loss of the device, into errors of the job.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;

@@ -1,4 +1,6 @@
-//! Device, queue and limits of an opened GPU, in a file of their own because buffers need no more.
+//! The parts of an opened GPU that suffice to make and fill buffers: wgpu's device and queue, the limits, and the
+//! kinds of memory that the GPU has. They have a file of their own because `buffers` needs them and `device`, which
+//! has the rest, needs `buffers`.
 
 use std::sync::Arc;
 

@@ -1,4 +1,6 @@
-//! Pictures in linear light: the colours that stage resolve would read, taken from the device band by band.
+//! Pictures in linear light, which the library offers: half floats instead of sRGB bytes. The GPU computes the
+//! colours of the pixels in all stages but the last (resolve). They are read back band by band (a band is a range
+//! of pixel rows), and the CPU lays them over the background.
 
 use half::f16;
 

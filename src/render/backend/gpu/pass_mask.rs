@@ -1,4 +1,7 @@
-//! Stage visibility: the passes over triangles, selected by their pass masks.
+//! The passes over triangles in which stage visibility finds what can be seen: one over the triangles of the
+//! surface and one over those of the outline mesh. A pass draws into the visibility buffer (the nearest triangle
+//! of each sample) or into the layers of depth peeling (what is transparent). The pass mask of a surface triangle,
+//! one byte, says into which of these two the triangle is drawn; it may be both.
 
 use std::ops::Range;
 

@@ -1,5 +1,6 @@
-//! Turns a [`Schedule`](super::schedule::Schedule)'s steps into commands and hands them to the
-//! device.
+//! The recorder of one job's commands (a job draws one picture): it turns the steps of a
+//! [`Schedule`](super::schedule::Schedule) into wgpu commands, hands them to the device, and reads back what the
+//! device has written.
 
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -1,6 +1,6 @@
-//! The duration of each stage on the device, by its own clock.
+//! The time that each stage of a picture takes on the GPU, measured by the GPU's own clock (timestamp queries).
 //!
-//! Only jobs that find the device idle are timed: times between the stages take time themselves, for which
+//! Only jobs that find the device idle are timed: to take the time between two stages takes time itself, for which
 //! other jobs would wait (docs/gpu-notes.md).
 
 use std::time::Duration;

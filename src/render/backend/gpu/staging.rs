@@ -1,4 +1,6 @@
-//! Buffers that the CPU reads pictures from, in place, while other jobs draw into others.
+//! Buffers from which the CPU reads finished pictures in place, without a copy. A picture keeps its buffer until the
+//! last reader of its pixels is done. Other jobs draw into other buffers meanwhile, and a buffer that no picture lies
+//! in is kept for a later job.
 
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};

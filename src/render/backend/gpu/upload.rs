@@ -1,4 +1,6 @@
-//! Uploads of a plan: the input of each stage, and room for its output.
+//! The upload of a plan (all that is to be drawn for one picture) to the GPU: for each stage, the buffers that it
+//! reads are filled, and those that it writes are made large enough. Data of a mesh that are on the GPU already are
+//! not written again.
 
 use super::buffers::Buffers;
 use super::device::Gpu;

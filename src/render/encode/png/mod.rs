@@ -1,5 +1,6 @@
-//! PNG in two ways: quickly for a picture that one client waits for, and small for one that is
-//! stored.
+//! The PNG encoder, in two ways. For an `effort` of 0 to 3 it is quick, for a picture that a client waits
+//! for. From 4 to 9 it takes longer and makes smaller files, for pictures that are stored. Animated PNG
+//! is written here, too.
 
 mod quick;
 

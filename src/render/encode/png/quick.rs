@@ -1,9 +1,10 @@
-//! PNG as rows come: one filter for the whole picture, Paeth, and Huffman codes that are not fitted to
-//! it.
+//! The quick PNG encoder. It takes the rows of a picture one after the other, so that upper rows are
+//! encoded while lower ones are still being drawn. There is one filter for the whole picture, Paeth, and
+//! the Huffman codes are not fitted to it.
 //!
-//! Paeth leaves of a rendering mostly runs of zeros, so trying more filters pays little. A row
-//! that equals the one above it, as in background and flat faces, is written as zeros without
-//! computing anything.
+//! Paeth leaves of a rendering mostly runs of zeros, so trying more filters pays little. Where eight
+//! pixels and the one left of them equal those above, as in the background and in flat faces, zeros are
+//! written without computing anything.
 
 use fdeflate::Compressor;
 use png::{ColorType, Filter, chunk};

@@ -1,7 +1,8 @@
-//! The folder of a bundle: resolves names in one of its files to other files.
+//! The files of an upload as a folder, in which a name that stands in one file is resolved to
+//! another: the URI of a glTF buffer, the path of an OBJ file's material library.
 //!
-//! Only names and bytes are handled here. No file is ever opened, so a name that leads out of the
-//! folder leads nowhere.
+//! Only names and bytes in memory are handled here, and no file of the machine is opened. A name
+//! that leads out of the folder (`../../other`) therefore reaches nothing outside the upload.
 
 use crate::import::bundle::{Bundle, BundleFile, FileUse, Origin, base_name, has_drive, show};
 use crate::import::{MeshError, MeshFault};

@@ -1,5 +1,9 @@
-//! Who gave the files of a bundle, which decides the words of messages; and which of the files the
-//! mesh used.
+//! The origin of an upload: an HTTP request, a command, or a call of the library. It decides the
+//! words of messages: a file is missing because "the upload lacks" it or because "the command does
+//! not name" it.
+//!
+//! Here is also the record (`FileUse`) of the files that a mesh used, and of those that it named
+//! and that are not there.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};

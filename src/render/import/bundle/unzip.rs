@@ -1,6 +1,6 @@
-//! Unpacks a zip archive into the files of a bundle. The archive's declarations are not trusted:
-//! its directory is walked entry by entry, entries must not share bytes, and unpacked bytes are
-//! counted.
+//! The unpacking of a zip archive into the files of an upload. What the archive declares is not
+//! trusted: its directory is walked entry by entry, entries must not share bytes, and unpacked
+//! bytes are counted.
 
 use crate::guard::guarded;
 use crate::import::bundle::{BundleFile, show};

@@ -1,4 +1,5 @@
-//! In place of `scene.rs` in a build without the feature `fbx`.
+//! The stand-in for `scene.rs` in a build without the feature `fbx`. It refuses every FBX file,
+//! with an error that names the feature.
 
 use crate::import::MeshError;
 use crate::import::context::Context;

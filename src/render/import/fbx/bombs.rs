@@ -1,5 +1,7 @@
-//! Refuses decompression bombs in binary FBX files. Their arrays are deflated one by one, and
-//! `ufbx` trusts the declared sizes as far as memory allows.
+//! The refusal of decompression bombs in binary FBX files. Their arrays are deflated one by one,
+//! and the parser `ufbx` trusts the declared sizes as far as memory allows. So the arrays whose
+//! declared size is not plausible (for example more than 200 times the packed bytes) are added up
+//! first, and a file with too many bytes of them is refused.
 //!
 //! The records follow the Blender Foundation's description ("FBX binary file format specification",
 //! 2013): the end of the node, the number and length of its properties, its name, the properties,

@@ -1,12 +1,16 @@
-//! Refuses files that would keep `ufbx` busy for minutes without a deadline check. Two of its loops
-//! are quadratic in node names that are rare in real files; those are counted in the bytes first.
+//! The refusal of FBX files that would keep the parser `ufbx` busy for minutes without a deadline
+//! check. Two of its loops take a time that grows with a product of the numbers of some nodes.
 //!
-//! Node names are counted as both kinds of file write them; a doubtful case counts.
+//! One is about textures that are made of other textures: the square of their number, times the
+//! number of all textures. The other searches the sets of texture coordinates and tangents for each
+//! entry of a layer (`LayerElement`). The names of these nodes are counted in the bytes before the
+//! file is parsed, as binary files and text files write them. A doubtful case counts.
 
 use crate::import::context::Context;
 use crate::import::{MeshError, MeshFault};
 
-/// Most pairs of a composed texture and a texture that it may be made of: about a second.
+/// Most steps of the loop that collects the textures of which others are made: their number, squared, times all textures.
+/// About a second.
 const COLLECTED_MAX: u64 = 32_000_000;
 /// Most pairs of a layer's entry and a set of coordinates, which it is searched among: about a
 /// second.

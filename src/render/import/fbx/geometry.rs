@@ -1,4 +1,5 @@
-//! Geometry of a scene: every instance of every mesh, placed by its node.
+//! The geometry of an FBX scene. A mesh is added once for each visible node that shows it, with the
+//! transform of that node applied. Line objects are added in the same way.
 
 use super::visibility::{Visibilities, Visibility};
 use crate::import::MeshError;

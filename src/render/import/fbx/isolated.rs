@@ -1,8 +1,10 @@
-//! Reads an FBX file in another process: the order that goes there, the answer that comes back, and the checks of it.
-//! The other process has read a stranger's file in C, so that its answer is a stranger's too.
+//! The reading of an FBX file in another process: the order that is sent, the answer that comes
+//! back, and the checks of the answer. The file may be hostile and its parser is written in C, so
+//! the process that parsed it is not trusted: its answer is checked like a stranger's file.
 //!
-//! serde writes both as `postcard`. The format is private to two processes of one program: for it alone, and with the
-//! feature `isolate` alone, [`RawMesh`] and the types in it derive `Serialize`.
+//! serde writes order and answer as `postcard`. This form is private to two processes of one
+//! program. For it alone, and with the feature `isolate` alone, [`RawMesh`] and the types in it
+//! derive `Serialize`.
 
 use serde::{Deserialize, Serialize};
 

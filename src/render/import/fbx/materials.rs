@@ -1,5 +1,6 @@
-//! Materials and textures of an FBX scene. Images are embedded, or found in the bundle by the last
-//! part of their names, because paths are those of the author's computer.
+//! Materials and textures of an FBX scene. An image is embedded in the file, or else found among
+//! the files of the upload: by its path, or by the last part of the path alone, because most paths
+//! are those of the author's computer.
 //!
 //! A missing file is a warning that says what to add, never an error: the shape is complete without
 //! it.

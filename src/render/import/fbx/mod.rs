@@ -1,10 +1,11 @@
-//! Autodesk FBX, binary and ASCII, parsed by `ufbx`. The library gets bytes, a cap on memory and a
-//! deadline callback, and opens no file. Indices that it returns are checked again. Without the
-//! feature `fbx` the files are known and refused.
+//! Autodesk FBX, binary and ASCII, parsed by the C library `ufbx`. The library gets bytes, a cap on
+//! memory and a deadline callback, and opens no file. Indices that it returns are checked again.
+//! Without the feature `fbx` the files are recognised and refused.
 //!
-//! [`scene`] loads a file, in another process where `isolated` has one; [`costs`] and [`bombs`] refuse files that would take it too long or too much memory,
-//! [`visibility`] finds hidden nodes, [`geometry`] places meshes and cuts their polygons,
-//! [`materials`] makes slots and images.
+//! `isolated` has a file read in another process, if the program has set one up. [`scene`] loads a
+//! file, [`costs`] and [`bombs`] refuse those that would take too much time or memory,
+//! [`visibility`] finds hidden nodes, [`geometry`] places meshes and splits their polygons, and
+//! [`materials`] reads materials and images.
 
 #[cfg(feature = "fbx")]
 mod bombs;

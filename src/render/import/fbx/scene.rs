@@ -1,4 +1,5 @@
-//! The scene of an FBX file: loaded by `ufbx`, then read part by part.
+//! The reader of FBX files. The library `ufbx` loads the scene, within limits of memory and time,
+//! and then the scene's geometry, materials and metadata are taken from it.
 
 use super::{bombs, costs, geometry, materials};
 use crate::guard::guarded;

@@ -1,5 +1,6 @@
-//! Visibility of nodes. Hidden nodes and their children are not drawn, and only one level of detail
-//! is.
+//! The visibility of the nodes of an FBX scene. A node that the file hides is not drawn, and
+//! neither are its children, except those that do not inherit visibility. Of an object in several
+//! levels of detail the first is drawn, unless the file selects another.
 
 use crate::import::MeshError;
 use crate::import::context::Context;

@@ -1,5 +1,6 @@
-//! Repairs vertex attributes: values become finite, normals become unit, and unusable arrays are
-//! dropped.
+//! The repair of vertex attributes (normals, texture coordinates, colours): values become finite,
+//! normals get unit length, and arrays that cannot be used are dropped, such as one without a value
+//! for each vertex.
 
 use crate::import::raw::RawMesh;
 use crate::mesh::Mesh;

@@ -1,4 +1,5 @@
-//! The faces of a raw mesh: its triangles with finite corners and an area.
+//! The choice of the triangles of an imported mesh that can be drawn (its faces): those with finite
+//! corners and an area that is not zero. Each gets a unit normal here. The others are counted.
 
 use super::geometry::{Geometry, Key as _};
 use super::local::{CORNERS_MAX, Local};

@@ -1,5 +1,6 @@
-//! The part of a raw mesh that normalisation reads: triangles, and the positions of their corners
-//! in f64.
+//! The trait `Geometry`, through which normalisation reads the triangles of an imported mesh. It is
+//! the same for the two ways in which importers deliver them: as indices of vertices, or as
+//! positions that are left where they lie in the file (STL).
 
 use crate::import::raw::Soup;
 

@@ -1,4 +1,5 @@
-//! The hash of three words, for positions and indices.
+//! The hash of three 32-bit words, for tables that find equal positions or equal indices. Its key
+//! is random, so that no file can be made whose values all collide.
 
 use std::hash::{BuildHasher, RandomState};
 

@@ -1,4 +1,6 @@
-//! Numbers the corners of a piece of a mesh, in the order of their first use.
+//! Local numbers of corners. A mesh is worked on in pieces, which are consecutive triangles with at
+//! most 65,535 corners. Within a piece each distinct corner gets a number, in the order of first
+//! use. These numbers fit 16 bits, so that the table by which they are found is small.
 
 use super::geometry::Key;
 use super::hasher::Hasher;

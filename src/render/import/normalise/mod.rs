@@ -1,7 +1,9 @@
-//! Turns a [`RawMesh`] into a [`Mesh`]: conversion from f64, the policy on NaN, and welding.
+//! The normal form of meshes: turns a [`RawMesh`], which is as the file has it, into a [`Mesh`].
+//! Positions in f64 become f32 in a box whose sides are at most 1, triangles with a NaN, an
+//! infinity or no area are dropped, and equal positions are welded (made one).
 //!
-//! Everything up to the unit box scales by powers of two alone, so that a file scaled by a power of
-//! two gives the same mesh.
+//! All scaling up to that box is by powers of two, which rounds nothing, so that a file scaled by a
+//! power of two gives the same mesh.
 
 pub(crate) mod attributes;
 mod faces;

@@ -1,5 +1,6 @@
-//! Welded positions, numbered in the order of their first use by faces, and then by lines and
-//! points.
+//! The final order of positions. Equal ones are welded (made one), and the distinct ones are
+//! numbered in the order of their first use by triangles, and then by lines and points. Those that
+//! nothing uses are left out.
 
 use super::faces::{Faces, Piece};
 use super::geometry::{Geometry, Key};

@@ -1,4 +1,5 @@
-//! Warns of coarse positions: f32 far from the origin.
+//! The warning `positions_coarse`: the file stores positions as f32, and so far from the origin
+//! that neighbouring f32 values are too far apart for the size of the mesh.
 
 use super::faces::Bounds;
 use crate::warning::Warning;

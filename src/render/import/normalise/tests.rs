@@ -1,5 +1,5 @@
-//! Triangles without indices (as in STL) become the same mesh as the same triangles with indices, on any number of
-//! threads.
+//! Tests that triangles without indices (as in STL) become the same mesh as the same triangles with
+//! indices, on any number of threads, and that unused vertices change nothing.
 
 use super::normalise;
 use crate::import::bundle::{Bundle, entry};

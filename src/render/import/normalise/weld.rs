@@ -1,7 +1,10 @@
-//! Welds positions that have equal bits.
+//! Welding: positions with equal bits get one number.
 //!
-//! Positions come in pieces. Those of all pieces are compared in shares by their hash, which each
-//! fit a core's cache. Threads take pieces and shares, and never wait for each other's memory.
+//! The caller passes positions in pieces of at most 65,535. First, each piece is sorted into shares
+//! (partitions) by the hash of each position, so that equal positions of all pieces meet in one
+//! share. Then each share is searched for equal positions with a hash table of its own, which
+//! usually fits a core's cache. Finally the numbers go back to the pieces. Threads work on whole
+//! pieces, then on whole shares, then on whole pieces again, and need no lock.
 
 use super::hasher::Hasher;
 use crate::limits::{Deadline, Stopped};

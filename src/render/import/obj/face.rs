@@ -1,4 +1,5 @@
-//! The corners of an `f` line.
+//! The parsing of one corner of an OBJ face: `v`, `v/vt`, `v//vn` or `v/vt/vn`. Indices count from
+//! 1, or back from the line if they are negative; here they become zero-based.
 
 /// The index of an attribute that a corner does not have.
 pub const MISSING: u32 = u32::MAX;

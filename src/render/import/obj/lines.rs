@@ -1,4 +1,6 @@
-//! The logical lines of an OBJ file: continued lines are joined, for all kinds of line ends.
+//! The lines of an OBJ or MTL file. A line that ends with a backslash is joined with the next,
+//! unless it is a comment. Line ends may be line feeds, with or without a carriage return, or
+//! carriage returns alone.
 
 use std::borrow::Cow;
 

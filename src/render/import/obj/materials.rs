@@ -1,4 +1,5 @@
-//! Material slots from the names in an OBJ file. Libraries and textures are found in the bundle.
+//! The materials of an OBJ file: each name in it gets the values that a material library (an MTL
+//! file) gives. Libraries and textures are found among the files of the upload.
 //!
 //! A missing file is a warning that says what to add, never an error: the shape is complete without
 //! it.

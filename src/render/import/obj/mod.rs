@@ -1,6 +1,9 @@
-//! Wavefront OBJ. The text is cut into parts (`cut`), which are parsed at the same time
-//! (`parse`) and then put together (`assemble`). Every error names its line, and no count is
-//! trusted. MTL files are read by [`mtl`]; [`materials`] makes slots and images from them.
+//! Wavefront OBJ. The text is cut into parts (`cut`), which several threads parse at the same time
+//! (`parse`) and which are then put together (`assemble`). An error in a line names the line. The
+//! memory that parsing takes is estimated from the text and checked against the limit before.
+//!
+//! MTL files, which describe materials, are read by [`mtl`]; [`materials`] makes the mesh's
+//! materials and images from them.
 
 mod assemble;
 mod cut;

@@ -1,4 +1,4 @@
-//! Content of an OBJ file that is not drawn.
+//! Counts of the content of an OBJ file that is not drawn, and the warnings about it.
 
 use crate::import::report::counted_warnings;
 use crate::warning::Warning;

@@ -1,4 +1,5 @@
-//! Recognises OBJ, which has neither a signature nor a keyword: by the first statement that parses.
+//! The recognition of OBJ, which has neither a signature nor a keyword. A file is taken for OBJ if
+//! a line in its first MiB is a vertex with three numbers, or a face with an index.
 
 use crate::import::text;
 

@@ -1,4 +1,6 @@
-//! Parts of any size, threads and both ways to parse a line give the same mesh.
+//! Tests of the OBJ importer, above all that the mesh does not depend on the size of the parts that
+//! a text is cut into, on the number of threads, or on which of the two ways (fast or general)
+//! parses a line.
 
 use super::assemble::Summary;
 use super::read_text;

@@ -1,4 +1,4 @@
-//! A binary body: big-endian 32-bit integers and floats.
+//! The body of a binary OFF file: big-endian 32-bit integers and floats.
 
 use super::header::Header;
 use super::{Counts, Number, Source};

@@ -1,4 +1,5 @@
-//! Colours of OFF files: whole numbers up to 255, or fractions up to 1.
+//! The colours of OFF files, converted to linear light. Components go up to 255 or up to 1: the
+//! largest one in the file decides, for whole numbers and for fractions separately.
 
 use super::Number;
 use crate::srgb::srgb_to_linear;

@@ -1,4 +1,5 @@
-//! The faces and their colours.
+//! The faces of an OFF file and their colours. A mesh has its colours at vertices, so a vertex of
+//! faces of different colours is duplicated. A file without faces is drawn as points.
 
 use super::colors::{COLOR_BYTES, Colors, WHITE};
 use super::{Counts, Source};

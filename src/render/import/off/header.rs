@@ -1,4 +1,8 @@
-//! The keyword: the attributes of vertices and the encoding.
+//! The keyword that begins an OFF file, such as `OFF`, `COFF` or `STCNOFF`. Its letters tell which
+//! attributes vertices have, and the word `BINARY` after it tells the encoding.
+//!
+//! Some files join the first count to the keyword (`OFF3`). The format also allows the keyword to
+//! be missing: a file that the client says is OFF may begin with its counts.
 
 use super::words::Words;
 use crate::import::{MeshError, MeshFault, text};

@@ -1,4 +1,5 @@
-//! Reads vertices.
+//! The vertices of an OFF file, text or binary: positions, normals, texture coordinates and
+//! colours, as far as the file has them.
 
 use super::colors::{COLOR_BYTES, Colors};
 use super::header::Header;

@@ -1,4 +1,5 @@
-//! Words, lines and comments of a text.
+//! The words of an OFF text, one by one, on one line or across lines. Comments, from `#` to the end
+//! of the line, are passed over.
 
 use crate::import::text;
 

@@ -1,5 +1,6 @@
-//! Assembles vertices and faces to a raw mesh. Polygons are split, and corners with attributes of
-//! their own get their own vertices.
+//! The assembly of a PLY mesh from the vertices and faces of the file. Polygons are split into
+//! triangles. A mesh has its attributes at vertices, so corners with texture coordinates or colours
+//! of their own get vertices of their own.
 
 use super::conversion::WHITE;
 use super::faces::{Faces, NO_TEXTURE};

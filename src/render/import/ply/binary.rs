@@ -1,4 +1,5 @@
-//! A binary body, in either byte order.
+//! The body of a binary PLY file, in either byte order. Triangles in their most frequent layout are
+//! read by several threads.
 
 use super::header::Kind;
 use super::layout::{Layout, Step};

@@ -1,4 +1,5 @@
-//! Colours and texture coordinates as PLY files store them.
+//! The conversion of PLY colours to linear light, and of PLY texture coordinates from v up to v
+//! down.
 
 use super::header::Kind;
 use crate::srgb::srgb_to_linear;

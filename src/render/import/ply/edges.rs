@@ -1,4 +1,5 @@
-//! The element `edge`, and points: the content of files without faces.
+//! The element `edge` of PLY files. A file without faces is drawn as its edges. One that has no
+//! edges either is drawn as its vertices, as points.
 
 use super::faces::vertex;
 use super::header::Element;

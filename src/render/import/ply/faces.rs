@@ -1,4 +1,4 @@
-//! The elements `face` and `tristrips`.
+//! The faces of a PLY file: its elements `face` (polygons) and `tristrips` (strips of triangles).
 
 use super::conversion::{WHITE, linearise, upright};
 use super::header::Element;

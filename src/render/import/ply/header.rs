@@ -1,4 +1,5 @@
-//! The header of a PLY file: its elements and their properties.
+//! The header of a PLY file: the encoding, and the elements (kinds of records, such as `vertex`)
+//! with their counts and properties.
 
 use crate::import::MeshError;
 use crate::import::bundle::show;

@@ -1,5 +1,5 @@
-//! The layout of an element: its properties, compiled to the steps through a record. Names are
-//! compared here once, not per record.
+//! The layout of a PLY element: its properties, translated into the steps that read one record
+//! (keep a number, keep a list, skip). Names of properties are compared here once, not per record.
 
 use super::header::{Element, Kind, Property, Shape};
 

@@ -1,5 +1,6 @@
-//! Walks the records of a body in any encoding. Counts are checked, the deadline polled and memory
-//! paid for here only.
+//! The walk through the records of a PLY body, in any encoding. The counts of lists are checked
+//! against what is left of the file, the deadline is polled, and memory is counted against the
+//! job's limit.
 
 use super::header::{Element, Kind};
 use super::layout::{Layout, Row, Step, VALUES_MAX};

@@ -1,4 +1,5 @@
-//! An ASCII body, read word by word, because exporters disagree on lines.
+//! The body of an ASCII PLY file. It is read word by word and not line by line, because exporters
+//! do not agree on how records are split into lines.
 
 use super::header::{Kind, word};
 use super::layout::Layout;

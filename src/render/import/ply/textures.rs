@@ -1,4 +1,5 @@
-//! Material slots for the textures that a header names, found in the bundle.
+//! The materials of a PLY file: one for each texture that its header names, and one for triangles
+//! without a texture if there are any. Texture files are found among the files of the upload.
 //!
 //! A missing file is a warning that says what to add, never an error: the shape is complete without
 //! it.

@@ -1,4 +1,5 @@
-//! The element `vertex`.
+//! The vertices of a PLY file (its element `vertex`): positions, normals, colours and texture
+//! coordinates. Binary records without lists are read by several threads.
 
 use super::conversion::{linearise, upright};
 use super::header::{Element, Kind};

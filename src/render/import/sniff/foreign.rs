@@ -1,6 +1,8 @@
-//! Files that are no mesh of a known format and are known for what they are: other mesh formats,
-//! archives, pictures. Each has advice, because a file may hold lines of a mesh by chance (a tar of
-//! OBJ files does) and must not be read as one.
+//! Kinds of files that are recognised but not read: other mesh formats, archives, pictures. They
+//! are refused, with advice where there is some (convert it, unpack it).
+//!
+//! Without this, a file that holds lines of a mesh by chance would be read as one: a tar archive of
+//! OBJ files does.
 
 use crate::import::text::trim_start;
 

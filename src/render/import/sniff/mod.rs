@@ -1,7 +1,9 @@
-//! Finds the format of some bytes from the bytes alone, because names and content types lie.
+//! The recognition of a format by the bytes alone, because file names and content types are often
+//! wrong.
 //!
-//! The tests are the formats' own, in [`FORMATS`]. They run by their [`Evidence`], the strongest
-//! first; between them stand refusals of what a weaker test would take for a mesh.
+//! The tests are those of the formats, in [`FORMATS`]. They run in the order of their [`Evidence`]
+//! (how much a match proves), the strongest first. Between them, files that a weaker test would
+//! wrongly take for a mesh are refused.
 
 pub(crate) mod foreign;
 

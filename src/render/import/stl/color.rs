@@ -1,5 +1,6 @@
-//! Colours in the two attribute bytes of binary STL: 5 bits per channel, in the two conventions in
-//! use.
+//! The colours in binary STL: two attribute bytes for each triangle, with 5 bits per channel. Two
+//! conventions are in use, that of VisCAM and SolidView and that of Materialise Magics. The header
+//! and the bytes tell which one a file follows.
 
 use crate::srgb::srgb_to_linear;
 

@@ -1,5 +1,5 @@
 //! STL, binary and ASCII, with the two conventions for colours in binary files ([`color`]). The
-//! stored normals are ignored: they repeat the corners, or are wrong.
+//! stored normals are ignored: they follow from the corners, or are wrong.
 
 mod color;
 

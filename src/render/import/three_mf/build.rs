@@ -1,5 +1,10 @@
-//! Places the build items with all their components. They are counted first, because components of
-//! components double with every level.
+//! The assembly of a 3MF file's mesh: each build item (an object that is to be printed) with its
+//! transform, and so on down through its components (references to other objects, each with a
+//! transform).
+//!
+//! Objects and triangles are counted before memory is reserved for them. Otherwise a small file in
+//! which each object refers twice to the next one could ask for 2^n copies. Such a file is refused
+//! by the limits.
 
 use super::model::{Group, NONE, Object, Triangle};
 use super::parts::{Key, Parts};

@@ -1,4 +1,5 @@
-//! One model part: its objects, build items and colours of property groups.
+//! One model part (an XML file) of a 3MF package: its objects (meshes or groups of other objects),
+//! its build items (objects that are to be printed), and its groups of colours.
 
 use super::namespaces::Space;
 use super::values::{color, transform};

@@ -1,4 +1,5 @@
-//! Finds the first model part of a package.
+//! The search for the first model part among the files of a 3MF package: the one that the package's
+//! relationships name, or the one at the usual path, or the first with the extension `.model`.
 
 use crate::import::bundle::BundleFile;
 

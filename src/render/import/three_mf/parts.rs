@@ -1,4 +1,5 @@
-//! All model parts that the first one refers to, each read once.
+//! All model parts (XML files) of a 3MF package to which the first one leads, directly or through
+//! others. Each is read once.
 
 use super::model::{Model, Object, Placed};
 use super::xml;

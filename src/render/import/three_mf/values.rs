@@ -1,4 +1,5 @@
-//! Attribute values of several parts: transforms and colours.
+//! Values of XML attributes in 3MF files: transforms (twelve numbers) and colours (`#RRGGBB` or
+//! `#RRGGBBAA`).
 
 use crate::import::affine::Affine;
 use crate::srgb::srgb_to_linear;

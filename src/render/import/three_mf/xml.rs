@@ -1,5 +1,6 @@
-//! Reads elements and attributes of an XML part by their names without prefixes, with the
-//! namespaces of elements. Entities are not expanded: a part with a DTD is refused.
+//! The reader of the XML in 3MF packages. It gives elements and attributes by their names without
+//! prefixes, with the namespaces of elements. A part with a DTD is refused, so that a file cannot
+//! declare entities that expand without bound.
 
 use super::namespaces::{Space, Spaces};
 use crate::guard::guarded;

@@ -1,9 +1,11 @@
-//! Collects the edges of a mesh by counting sort, in pieces that several threads share.
+//! The search for the edges of a mesh: all sides of its triangles are sorted by counting sort, and sides
+//! between the same two vertices become one edge. Several threads share the work.
 //!
-//! A side of triangle `t` has the number `3 t + i` and goes from corner `i` to corner `i + 1`. Sides
-//! are sorted by their lower vertex; in the bucket of a vertex those with the same upper vertex are
-//! mates. The first side of each set of mates becomes an edge, so edges come in the order of their
-//! first triangles. Loops avoid branches, because the order of a mesh's triangles cannot be predicted.
+//! A side of triangle `t` has the number `3 t + i` and goes from corner `i` to corner `i + 1`. Sides are
+//! sorted into buckets by the lower of their two vertex numbers. Those in a bucket that have the same
+//! upper vertex, too, are called mates: they are one edge. The first side of each set of mates becomes
+//! that edge, so edges come in the order of their first triangles. Loops avoid branches, because the
+//! order of a mesh's triangles cannot be predicted.
 
 use std::ops::Range;
 use std::sync::Arc;

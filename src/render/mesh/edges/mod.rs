@@ -1,4 +1,5 @@
-//! The unique edges of a mesh and the faces at each.
+//! The edges of a mesh: each is listed once, with the faces that meet there. Lines, outlines and reports
+//! on a mesh are made from this list.
 
 mod collect;
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! Edges.
+//! Tests of the list of edges: the edges of small meshes, their faces and their kinds, and larger ones
+//! compared with a map of edges.
 
 use super::*;
 use crate::limits::Limits;

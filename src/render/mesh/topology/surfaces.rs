@@ -1,5 +1,6 @@
-//! The surfaces of a mesh: faces that are connected through manifold edges, and cut apart at all
-//! other edges.
+//! The surfaces of a mesh, with their orientability and genus. A surface is a set of faces that are
+//! connected through manifold edges, which are edges with exactly two faces. At all other edges, faces
+//! count as cut apart.
 
 use super::fans::Fans;
 use crate::mesh::Mesh;

@@ -1,4 +1,5 @@
-//! Small meshes whose numbers are known.
+//! Tests of topology: small meshes, such as a torus and a Moebius strip, whose numbers of components,
+//! edges, loops and handles are known.
 
 use super::*;
 use crate::limits::{Limits, Stopped};

@@ -1,8 +1,9 @@
-//! Cut-outs: faces, and sides of faces, on which a texture with an alpha mask has nothing. They get no
-//! outline, and what shows nothing at all does not frame the picture (`framing`).
+//! Cut-outs: faces with a texture whose alpha mask makes parts of them invisible, such as a card with a
+//! leaf on it. It is found which of these faces, and which sides of them, show no texel at all. Such a
+//! side gets no outline, and the camera is not fitted to such a face (`framing`).
 //!
-//! It is a fact about the mesh, found once from the images' own texels. It is conservative: where it is
-//! not certain that nothing shows, something does.
+//! The result depends on the mesh alone and is found once for it, from the texels of its images. It is
+//! conservative: where it is not certain that nothing is visible, something counts as visible.
 
 mod pyramid;
 

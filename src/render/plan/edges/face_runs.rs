@@ -1,9 +1,9 @@
-//! Runs of 32 consecutive faces of a mesh, each with a bounding box and a cone that contains its
-//! normals. From these a view decides for a whole run whether it is in the picture and whether it
-//! faces the viewer.
+//! Runs of 32 consecutive faces of a mesh, each with a bounding box and a cone that contains its normals.
+//! By these it is decided for a whole run whether it is in the picture of a camera and whether it faces
+//! the viewer.
 //!
-//! Consecutive faces are mostly neighbours. If they are not, the box and the cone are wide, and the
-//! view has to look at each face.
+//! Consecutive faces are mostly neighbours. If they are not, the box and the cone are wide, and each face
+//! has to be looked at.
 
 use std::ops::Range;
 

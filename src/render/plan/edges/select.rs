@@ -1,4 +1,6 @@
-//! Works through long lists on several threads.
+//! Parallel work on long lists: `select` collects what is found in the items of a list, `map` computes a value for
+//! each item. Results keep the order of the items, whatever thread found them. `select` goes through the list
+//! twice: it counts first, so that the memory of the results is taken from the budget before it is allocated.
 
 use std::ops::Range;
 

@@ -1,4 +1,7 @@
-//! Edges that may be silhouette edges, and the two faces that decide.
+//! The edges of a mesh that may be silhouette edges in some view, and the two faces of each that decide it. An edge
+//! is a silhouette edge of a view if all its faces that are drawn lie on one side of it on screen. Around an edge
+//! with more than two faces, the two beside the widest gap decide. If the gap is wider than half a turn, all faces
+//! are on one side exactly where these two are. If it is not, no view makes the edge a silhouette edge.
 
 use std::collections::BTreeMap;
 

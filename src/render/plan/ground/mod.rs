@@ -1,8 +1,9 @@
 //! The ground: a soft contact shadow on the plane under the mesh, for `scene.ground`. It is a grid of
-//! triangles without light, whose vertex colours are black and let more or less through, so back-ends
-//! draw it as any transparent surface.
+//! unlit black triangles, more or less transparent at each vertex, so back-ends draw it like any
+//! transparent surface.
 //!
-//! Only the depth range of the camera makes room for it. It has no edges, no outlines and no topology.
+//! The camera is not fitted to the shadow; only its depth range has room for it. The shadow has no edges,
+//! no outlines and no topology.
 
 mod shadow;
 

@@ -1,8 +1,10 @@
-//! A contact shadow: how much of the sky the mesh hides from the plane below it, roughly.
+//! The contact shadow on the plane below a mesh: how much of the sky the mesh hides from each place
+//! there, roughly.
 //!
-//! A height map of the mesh from below has the lowest height over each cell. A cell darkens its
-//! surroundings: the lower it is, the more, and the closer to it. Blurs of a few widths stand for that,
-//! each three box filters. All is f64 in a fixed order, so it is the same on every machine.
+//! A grid lies on the plane. For each of its cells, a height map has the lowest height of the mesh above it. The
+//! mesh above a cell darkens the plane around it: the lower it is, the darker, and the narrower the shadow. This is
+//! approximated by blurs of a few widths, each made of three box filters. All is f64 in a fixed order, so it is the
+//! same on every machine.
 
 use glam::DVec3;
 

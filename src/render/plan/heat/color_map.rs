@@ -1,4 +1,6 @@
-//! The colour maps of diagnostics, whose lightness grows evenly with the number.
+//! The two colour maps that turn numbers into colours in diagnostic pictures. `SEQUENTIAL` (viridis) gets
+//! lighter evenly from the lowest number to the highest. `DIVERGING` goes from blue through light grey to
+//! red, for numbers with a neutral middle.
 
 use std::sync::LazyLock;
 

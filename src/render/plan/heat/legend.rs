@@ -1,4 +1,5 @@
-//! The meaning of a diagnostic's colours.
+//! The legend of a diagnostic picture as data: the name of what its colours measure, the lowest and the
+//! highest number, and the colours between them. `caption` draws it.
 
 use super::color_map::ColorMap;
 use crate::image::srgb8_thresholds;

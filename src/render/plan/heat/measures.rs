@@ -1,4 +1,6 @@
-//! The numbers that diagnostics show, in f64, each operation rounded by itself.
+//! The numbers that diagnostic pictures show as colours: the quality of a triangle's shape, the mean
+//! length of its edges, the stretch of its texture, and the mean curvature at a vertex. They are computed
+//! in f64, each operation rounded by itself.
 
 use super::CHECK_EVERY;
 use crate::limits::Deadline;

@@ -1,7 +1,9 @@
-//! Feature edges that are joined at vertices form chains. Short ones are left out.
+//! The removal of short lines along feature edges, which are edges where the surface bends sharply or
+//! ends. Feature edges that are joined at vertices form a chain. Chains that are shorter on screen than
+//! `wire.min_length` are left out.
 //!
-//! The folds of a scan bend by more than any angle in a multitude of places, a few pixels long: lines there are
-//! hatching without a meaning.
+//! The surface of a scan has a multitude of small folds, a few pixels long, that bend as sharply as true features.
+//! Lines along them would look like hatching without a meaning.
 
 use crate::limits::LimitExceeded;
 use crate::mesh::Mesh;

@@ -1,4 +1,6 @@
-//! The line styles of a scene, and the edges that have each.
+//! The line styles of a picture. A style is the width, the colour and the treatment of hidden parts of
+//! some lines, and it says which edges of the mesh they follow. The styles follow from the wires, the
+//! topology layer and the contours of the request; materials whose lines look the same share one.
 
 use std::sync::Arc;
 

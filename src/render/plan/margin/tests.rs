@@ -1,3 +1,6 @@
+//! Tests of the margin: where the camera alone shows that the whole mesh lies inside the picture, its
+//! positions show the same.
+
 use super::*;
 use crate::import::{Bundle, import};
 use crate::limits::{Budget, Limits};

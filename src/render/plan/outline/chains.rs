@@ -1,8 +1,9 @@
-//! Chains: parts of silhouette edges that are joined at vertices. Those that are too short to say
-//! anything are not drawn.
+//! Chains of silhouette edges: visible parts of these edges, where a surface ends on screen, that are
+//! joined at vertices. Chains that are too short are not drawn, unless they border the background or
+//! leave the picture.
 //!
-//! Scans and coarse meshes have a multitude of tiny folds. Each has a silhouette of a few pixels,
-//! beside which an outline would be a crumb.
+//! Scans and coarse meshes have a multitude of tiny folds. Each has a silhouette of a few pixels, and an
+//! outline beside it would look like a crumb.
 
 use crate::limits::{Deadline, Stopped};
 use crate::mesh::union_find::UnionFind;

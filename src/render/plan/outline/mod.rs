@@ -1,8 +1,8 @@
-//! The hull: an outline around surfaces, as a mesh of triangles that are on screen already.
+//! The hull: an outline around surfaces, drawn as a mesh of triangles that is made for one view.
 //!
-//! Users know inverted hulls, copies of a mesh pushed out along its normals. This outline mesh
-//! differs: a plan knows its camera, so it draws the border itself, as wide as it should be and
-//! with round corners. Beside each [silhouette edge](silhouette_edges) lies an [offset
+//! Users know inverted hulls, copies of a mesh pushed out along its normals. This outline mesh differs: a
+//! plan knows its camera, so it makes the border itself, as wide as it should be and with round corners.
+//! Beside each [silhouette edge](silhouette_edges), where a surface ends on screen, lies an [offset
 //! quad](build), and around the vertices between two of them a [round join](round_join).
 
 pub(crate) mod build;

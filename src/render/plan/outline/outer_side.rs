@@ -1,4 +1,6 @@
-//! The outer side of an offset quad: where it lies beside its edge, and how deep.
+//! The outer side of an offset quad, the quad that draws the outline beside one silhouette edge. Its
+//! place on screen follows from the outline's thickness. Its depth recedes from the viewer, so that
+//! surfaces next to the edge hide the outline, and surfaces farther behind do not.
 
 use crate::plan::Edge;
 use crate::plan::outline::ScreenPoint;

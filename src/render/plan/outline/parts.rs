@@ -1,4 +1,6 @@
-//! The parts of silhouette edges that an outline draws: the visible ones, without short chains.
+//! The parts of silhouette edges (where a surface ends on screen) that an outline draws: those that no face hides,
+//! without chains that are too short. Both kinds of outlines are made from them: hulls, which are meshes beside the
+//! shape, and contours, which are lines.
 
 use crate::mesh::edges::EdgeList;
 use crate::plan::PlanError;

@@ -1,4 +1,5 @@
-//! Silhouette edges on screen, cut to what may be in the picture, and how far outlines reach there.
+//! Silhouette edges on screen, each cut to the part whose outline may be in the picture. How far an
+//! outline reaches from its edge, and how deep it lies there, is computed here, too.
 
 use crate::plan::context::PlanContext;
 use crate::plan::edges::select::map;

@@ -1,4 +1,5 @@
-//! Sorting of long lists.
+//! Sorting of long lists, for the corners of outlines. It works in steps, between which it is checked whether the
+//! job has to end.
 
 use std::cmp::Ordering;
 

@@ -1,5 +1,6 @@
-//! Lines and points without a fill: lines of exact width, in the colour and width of their
-//! material's own wire or outline.
+//! Lines and points of the file whose material has no filled surface. They are drawn as lines of exact
+//! width in pixels, in the colour and width of their material's own wire or outline. A point is a line of
+//! no length, which shows as a dot.
 
 use std::sync::Arc;
 

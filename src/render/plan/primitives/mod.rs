@@ -1,7 +1,7 @@
-//! Line and point primitives, which have no area.
+//! Line and point primitives of the file, which have no area.
 //!
-//! Those whose material has a fill are triangles that face the camera and are shaded with the
-//! surface ([`geometry`]). The others are lines of exact width ([`line_passes`]).
+//! Those whose material has a filled surface are triangles that face the camera and are shaded with the
+//! surface ([`geometry`]). The others are lines of exact width in pixels ([`line_passes`]).
 
 pub mod depth_cue;
 mod lines;

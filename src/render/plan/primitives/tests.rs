@@ -1,4 +1,5 @@
-//! Geometries spend before they allocate, and leave the mesh as it is.
+//! Tests of the triangles that stand for lines and points: their memory is taken from the budget before
+//! it is allocated, and the mesh stays as it is.
 
 use super::geometry;
 use crate::limits::{Budget, Deadline, Limits};

@@ -1,5 +1,7 @@
-//! The measured error and time of each technique: `error_table.json`. The benchmark writes it
-//! (`cargo bench --bench accuracy -- --write`), and the file explains its numbers.
+//! The measured error and time of each drawing technique (a way to draw the edges of faces, wires or outlines), by
+//! back-end and number of samples: `error_table.json`. By it, `quality` selects what a request with a quality
+//! target leaves open. The benchmark writes it (`cargo bench --bench accuracy -- --write`), and the file explains
+//! its numbers.
 
 use std::sync::LazyLock;
 

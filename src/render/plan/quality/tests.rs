@@ -1,3 +1,5 @@
+//! Tests of the selection of techniques for a quality target, from a small table of errors and times.
+
 use super::*;
 use crate::limits::Limits;
 use crate::request::{self, Rules};

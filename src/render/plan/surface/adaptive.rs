@@ -1,4 +1,6 @@
-//! Adaptive samples: which pictures have them, and how many samples the others get instead.
+//! The decision for adaptive samples: a few samples in every pixel, and many more points in pixels near
+//! which faces of different colours meet. Some pictures cannot have them, for example those in which all
+//! faces are transparent. They get 16 samples in every pixel instead, and a warning.
 
 use crate::plan::PeelingPass;
 use crate::plan::context::PlanContext;

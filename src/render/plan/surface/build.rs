@@ -1,4 +1,6 @@
-//! The surface of a plan: its materials, and the arrays that they read.
+//! The making of the surface, the part of a plan that colours filled faces: its materials as shaders read
+//! them, its textures and lamps, and the arrays that these materials read, such as normals and texture
+//! coordinates. Arrays that no material reads are left out.
 
 use std::borrow::Cow;
 use std::sync::Arc;

@@ -1,4 +1,5 @@
-//! Texture levels that a picture can reach: finer ones need not be kept.
+//! The finest mip level of each texture that a pixel of the picture can sample, or a finer one where that
+//! is not certain. Levels finer than this need not be kept.
 //!
 //! A pixel's footprint in a texture is an ellipse, and A the product of its axes: the texels that the pixel covers. The
 //! sampler takes the level of the longer axis where the axes' ratio r is below 1.5, which is at least

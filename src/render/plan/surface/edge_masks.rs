@@ -1,4 +1,5 @@
-//! The edges of each triangle that barycentric wires follow.
+//! A mask for each triangle that says which of its three edges get a wire. It is for wires that are drawn
+//! by barycentric coordinates while the surface is shaded, and for the debug view of distances to edges.
 
 use crate::mesh::Mesh;
 use crate::mesh::edges::{Edge, EdgeList};

@@ -1,5 +1,5 @@
-//! The lamps of a preset. They are placed around the viewer, so that every view of a model is lit
-//! equally well.
+//! The lamps of each lighting preset of a request. They are placed around the viewer, so that every view
+//! of a model is lit equally well.
 
 use glam::DVec3;
 

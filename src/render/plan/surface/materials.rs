@@ -1,4 +1,5 @@
-//! A material of the file and its style to the material that the shaders read.
+//! The translation of materials: a material of the file, and the style that the request gives it, become
+//! a `ShadedMaterial`, which is the form that the shaders read.
 
 use super::textures::TextureLoader;
 use crate::mesh::material::{AlphaMode, TextureRef};

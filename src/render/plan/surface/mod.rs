@@ -1,4 +1,6 @@
-//! The surface: what turns a visible sample into a colour.
+//! The surface of a plan: all that a back-end needs to turn a visible point of a filled face into a
+//! colour. These are materials, textures, lamps, and values at the corners of triangles, such as normals.
+//! The layout of materials and the bits of their flags, which shaders read, are defined here.
 
 pub(crate) mod adaptive;
 pub(crate) mod build;

@@ -1,5 +1,7 @@
-//! Occlusion: how much light does not reach the bottom of hollows, from the depths that the picture
-//! shows. docs/rasterizer.md, "Occlusion", has the definition.
+//! Occlusion: how much light does not reach the bottom of hollows. Back-ends estimate it from the depths that the
+//! picture shows (screen-space ambient occlusion). Here it is decided whether a picture has it, and its numbers are
+//! computed: how far surfaces darken each other, and which places around a pixel are looked at. docs/rasterizer.md,
+//! "Occlusion", has the definition.
 
 use crate::plan::SurfacePass;
 use crate::plan::context::PlanContext;

@@ -1,5 +1,6 @@
-//! Loads the images that materials sample. An image is decoded only if it is sampled, once per way
-//! of reading its texels, and only to the size that the picture can show.
+//! The loader of the images that materials sample. An image is decoded only if it is sampled, once per
+//! way of reading its texels (as colours, as numbers, or with an alpha cutoff), and only to the size that
+//! the picture can show.
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;

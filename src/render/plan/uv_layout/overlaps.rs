@@ -1,6 +1,6 @@
-//! Faces that overlap in the texture, found at the points of a grid: a point on an edge belongs to one of
-//! the edge's two faces, so a point with two owners lies where faces overlap. Overlaps between the points
-//! are not found.
+//! The faces that overlap others in the texture. They are found at the points of a grid: where a point
+//! lies in two faces, these overlap. A point on an edge belongs to one of the edge's two faces, so that
+//! neighbours do not count as overlapping. Overlaps between the points are not found.
 
 use crate::limits::{Deadline, Stopped};
 

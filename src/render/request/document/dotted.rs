@@ -1,5 +1,6 @@
-//! Writes a document and the dotted keys that override it as dotted keys alone, for use in an
-//! address.
+//! The translation of a request into dotted keys alone (such as `wire.color`), for use in the query of an
+//! address. A JSON document and the dotted keys that override it become one list of keys that means the
+//! same picture.
 
 use serde_json::Value as Json;
 

@@ -1,5 +1,6 @@
-//! Refuses duplicate keys, under the same name or under a short and a long one: the sender meant
-//! both, and one would be lost.
+//! The check that refuses a request with duplicate keys. The key may be given twice under the same name,
+//! or under a short and a long one (`samples` and `image.samples`). The sender meant both values, and one
+//! would be lost.
 
 use std::collections::BTreeMap;
 

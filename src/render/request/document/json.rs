@@ -1,4 +1,6 @@
-//! Turns a JSON document into a flat list of dotted keys.
+//! The flattening of a JSON document into a list of dotted keys and their values: an object `wire` with
+//! the key `color` becomes the key `wire.color`. After that, documents and queries are read by the same
+//! code.
 
 use serde_json::Value as Json;
 

@@ -1,4 +1,5 @@
-//! Request documents that are sent in place of a mesh: they name a stored one under the key `mesh`.
+//! Request documents that are sent in place of a mesh file: under the key `mesh` they name a mesh that
+//! the server has stored. A glTF file is JSON as well, so the two must be told apart here.
 
 use std::fmt;
 

@@ -1,5 +1,5 @@
-//! Parses JSON and refuses objects with duplicate keys: RFC 8259 leaves open which of two values
-//! counts.
+//! A JSON parser that refuses objects with duplicate keys: RFC 8259 leaves open which of two values
+//! counts. Documents that are nested too deep are refused, too.
 
 use std::fmt;
 

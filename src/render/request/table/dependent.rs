@@ -1,4 +1,5 @@
-//! Values whose defaults depend on other keys.
+//! A value of a request whose default depends on other keys. Until all keys are read, it only says
+//! whether the request gives it.
 
 /// A value that is given, or else settled when all keys are known.
 #[derive(Clone, Copy, Debug)]

@@ -1,4 +1,6 @@
-//! The parts of the table: keys that hold values, and sections that hold keys.
+//! The types of the table of keys: a `Field` is a key that holds a value (`wire.color`), a `Section` is
+//! an object that holds keys (`wire`). For each type of value it is defined here which values a key
+//! allows, unless its entry in the table says otherwise.
 
 use serde_json::Value as Json;
 

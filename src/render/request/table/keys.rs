@@ -1,5 +1,6 @@
-//! The keys that hold values, each in one entry: key, place, what is allowed, short name, default;
-//! and what it does.
+//! The list of all keys of a request that hold values, except `style`. The entry of a key has its name,
+//! the place in the draft that it sets, the values that are allowed, its short name and its default if it
+//! has them, and a line on what it does.
 
 use serde_json::Value::Null;
 use serde_json::json;

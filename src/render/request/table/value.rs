@@ -1,5 +1,5 @@
-//! Values of a request: as they are given, the kinds that keys allow, and what is left after the
-//! check.
+//! Values of a request, in three types: `Given` is a value as it was sent, as JSON or as text; `Kind`
+//! says which values a key allows; `Value` is a value that has passed this check.
 
 use serde_json::Value as Json;
 

@@ -1,4 +1,4 @@
-//! Layers of materials, which begin from those of the document.
+//! Tests of the layers of single materials, which begin from those of the document.
 
 use crate::request::tests::{json, query, rules};
 use crate::request::*;

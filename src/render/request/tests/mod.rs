@@ -1,4 +1,4 @@
-//! Documents and dotted keys, read into specs.
+//! Tests of the reader of requests: documents and dotted keys, and the specs that they become.
 
 mod materials;
 mod refused;

@@ -1,4 +1,4 @@
-//! Requests that are refused, and the key that each error names.
+//! Tests of requests that are refused, and of the key that each error names.
 
 use crate::request::tests::{json, query, rules};
 use crate::request::*;

@@ -1,6 +1,6 @@
-//! Connections: the accept loop and the client's socket, both with limits on a client's silence.
+//! Connections: the accept loop and the client's socket, both with limits on how long a client may be silent.
 
 pub mod accept;
 pub mod activity;
 mod io;
-mod places;
+pub mod places;

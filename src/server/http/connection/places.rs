@@ -1,5 +1,6 @@
-//! The places for connections: all of them, those of one address, and a few more on which health is asked for while all
-//! others are taken.
+//! Limits on the number of open connections: of all clients together, and of one address (of IPv6, a network of 64
+//! bits). A few more connections are kept for questions about health (such as `/healthz`), one question each, which
+//! are answered although all other connections are taken.
 
 use std::collections::HashMap;
 use std::net::IpAddr;
@@ -87,7 +88,7 @@ fn lock(counts: &Mutex<HashMap<IpAddr, usize>>) -> MutexGuard<'_, HashMap<IpAddr
     counts.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Of IPv6, the network of 64 bits: whoever has one has all its addresses.
+/// The client behind an address: of IPv6, the network of 64 bits, all of whose addresses one machine may use.
 pub fn network(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(address) => IpAddr::V6((address.to_bits() >> 64 << 64).into()),
@@ -101,6 +102,15 @@ mod tests {
 
     fn address(text: &str) -> IpAddr {
         text.parse().unwrap()
+    }
+
+    #[test]
+    fn an_ipv6_network_is_one_client() {
+        let of = |text: &str| network(address(text));
+        assert_eq!(of("2001:db8::1"), of("2001:db8::ffff:1"));
+        assert_ne!(of("2001:db8::1"), of("2001:db8:0:1::1"));
+        assert_eq!(of("::ffff:10.0.0.1"), of("10.0.0.1"));
+        assert_ne!(of("10.0.0.1"), of("10.0.0.2"));
     }
 
     #[test]

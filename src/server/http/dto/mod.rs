@@ -1,5 +1,7 @@
-//! The JSON of every answer. Domain types do not serialise themselves, so that a change of theirs
-//! cannot change the interface.
+//! The JSON of answers about jobs, stored meshes, errors and the process. Domain types do not serialise themselves, so
+//! that a change of theirs cannot change the interface.
+//!
+//! Reports on meshes, verdicts and differences are other JSON: the crate `meshsnap-inspect` writes it.
 
 mod capabilities;
 mod job;

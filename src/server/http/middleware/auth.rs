@@ -1,4 +1,6 @@
-//! Authentication by bearer tokens: whose request it is, and whether its key permits it.
+//! The check of a request's API key: whose request it is, and whether the key permits it. A key is sent as a bearer token,
+//! or has signed the address of a picture. Where no keys are configured, everything is permitted, and clients are told
+//! apart by their addresses.
 
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -10,6 +12,7 @@ use axum::middleware::Next;
 use axum::response::Response;
 
 use crate::http::connection::activity::Client;
+use crate::http::connection::places::network;
 use crate::http::error::{ApiError, ErrorKind};
 use crate::http::state::AppState;
 use crate::jobs::Owner;
@@ -89,7 +92,9 @@ fn unix_s() -> u64 {
 /// Without keys, clients are told apart by their addresses.
 fn by_address(request: &Request) -> Owner {
     let client = request.extensions().get::<ConnectInfo<Client>>();
-    client.map_or_else(Owner::default, |ConnectInfo(client)| Owner::new(&format!("address {}", client.address.ip())))
+    client.map_or_else(Owner::default, |ConnectInfo(client)| {
+        Owner::new(&format!("address {}", network(client.address.ip())))
+    })
 }
 
 /// The token that a request carries. None if it carries two, of which the crate `headers` would take the first.

@@ -1,4 +1,4 @@
-//! Pages of other origins that may use the interface (CORS).
+//! The CORS headers, by which browsers let pages of other origins use the interface: those that `--cors-origins` names.
 
 use std::time::Duration;
 

@@ -1,4 +1,5 @@
-//! Steps around every request, whatever its handler is.
+//! Steps before and after the handlers. `observe` is around the whole router, and so is `cors` where origins are
+//! configured. `site`, `auth` and `rates` may refuse requests for `/metrics` and for paths under `/v1`.
 
 pub mod auth;
 pub mod cors;

@@ -1,4 +1,5 @@
-//! The id of each request, its span in the log, and the body of its error.
+//! The step around the router that gives each request an id and a span in log and traces, and logs how it ended. It also
+//! writes the body of an error, a problem document (RFC 9457), because the id of the request is part of it.
 
 use std::sync::Arc;
 use std::time::Instant;

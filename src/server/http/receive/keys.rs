@@ -1,4 +1,5 @@
-//! The keys of requests that ask for a verdict: from the query, or from a JSON document in place of a mesh.
+//! The parameters of a check or a comparison, such as `rules` and `max_distance`. They come from the query, and from the
+//! JSON document that names stored meshes in place of an upload. They have nothing to do with API keys.
 
 use std::fmt;
 

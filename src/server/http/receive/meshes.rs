@@ -1,4 +1,4 @@
-//! A form with several meshes: a job for each, by the same request.
+//! A form with several meshes (`mesh` parts): it becomes a job for each of them, all with the same document and query.
 
 use std::sync::Arc;
 

@@ -1,9 +1,9 @@
-//! From a request to work for a worker. The cheapest refusals come first.
+//! The reading of requests: from HTTP to work for a worker. The cheapest refusals come first.
 //!
-//! [`query`] reads the query, [`body`] the body within its limits. [`check`] and [`diff`] read requests for
-//! verdicts, by [`keys`] of their own. [`sender`] knows who sends a request, [`idempotency`] what is sent again. [`meshes`]
-//! makes a job of each mesh of a form.
-//! [`upload`] names what is to be stored. [`webhook`] reads who hears of a job's end.
+//! [`query`] reads the query, [`body`] the body within its limits. [`check`] and [`diff`] read requests for verdicts,
+//! whose parameters [`keys`] reads. [`meshes`] makes a job of each mesh of a form. [`sender`] knows who sends a request,
+//! [`idempotency`] whether it was sent before, [`webhook`] which address is told of its job's end. [`upload`] names a mesh
+//! by its content.
 
 pub mod body;
 pub mod check;

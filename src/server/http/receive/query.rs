@@ -1,4 +1,5 @@
-//! The query of a request: how the mesh is read, and the dotted keys of the request document.
+//! The query of a request: how the mesh is read (`format_in`, `entry`), and keys of the request document in dotted form
+//! (`camera.azimuth_deg=30`).
 
 use axum::extract;
 use axum::http::Uri;

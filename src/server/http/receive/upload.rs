@@ -1,4 +1,4 @@
-//! From an upload to a stored mesh: the same content gives the same name and the same bundle. So
+//! The name of an upload: the SHA-256 of its content. The same content gives the same name and the same list of files. So
 //! every picture of a stored mesh follows from its name and the request alone.
 
 use std::sync::Arc;

@@ -1,5 +1,5 @@
-//! Answers about the process itself. None of them waits for a worker, nor for a lock that is held
-//! while drawing.
+//! Answers about the process itself: `/healthz`, `/readyz`, `/version` and `/v1/capabilities`. None of them waits for a
+//! worker, nor for a lock that is held while drawing.
 
 use std::sync::Arc;
 

@@ -1,4 +1,5 @@
-//! Answers that several resources give.
+//! Answers that several resources give: a picture or a verdict with its headers, the state of a job, and JSON that caches
+//! must not keep. A verdict that failed gets its 422 here, if the request asks for that (`fail=422`).
 
 use axum::Json;
 use axum::body::Body;

@@ -1,4 +1,4 @@
-//! Workers that do not end their jobs.
+//! Tests of workers that do not end their jobs when the time is up.
 
 use super::*;
 

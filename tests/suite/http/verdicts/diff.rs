@@ -227,9 +227,12 @@ fn mistakes_are_refused_with_what_is_wrong() {
 fn a_difference_is_a_job_too_and_outlives_the_process() {
     let folder = tempfile::tempdir().unwrap();
     let body = sides(CUBE_OBJ, &hole());
-    let (jobs, told, heat) = {
+    // Neither mesh of this one is ever stored.
+    let unstored = sides(torus(12).as_bytes(), &moved());
+    let (jobs, told, told_of_unstored, heat) = {
         let mut server = durable::start(folder.path(), &["--workers", "1"]);
         let told = server.request("POST", "/v1/diff", &[FORM], &body);
+        let told_of_unstored = server.request("POST", "/v1/diff", &[FORM], &unstored);
         let heat = server.request("POST", "/v1/diff?format=webp&size=64x32", &[FORM], &body);
         let document =
             json!({ "a": Digest::of(CUBE_OBJ).to_string(), "b": Digest::of(&hole()).to_string() }).to_string();
@@ -241,26 +244,30 @@ fn a_difference_is_a_job_too_and_outlives_the_process() {
         assert_eq!(server.request("GET", &ended, &["Prefer: wait=30"], b"").json()["state"], "done");
         let busy = server.post("/v1/jobs?size=4096&samples=16&style=wire", torus(60).as_bytes());
         assert_eq!(busy.status, 202);
+        server.wait_for_load(|load| load["running"] == 1);
         let send = || server.request("POST", "/v1/jobs?kind=diff", &[FORM, "Idempotency-Key: one"], &body);
         let of_upload = send();
         assert_eq!(send().header("location"), of_upload.header("location"));
         let of_stored = server.request("POST", "/v1/diff", &[JSON, "Prefer: respond-async"], document.as_bytes());
         assert_eq!(of_stored.header("preference-applied"), Some("respond-async"));
         let picture = server.request("POST", "/v1/jobs?kind=diff&format=webp&size=64x32", &[FORM], &body);
-        let waiting = [of_upload, of_stored, picture].map(|job| job.header("location").unwrap().to_owned());
+        let of_unstored = server.request("POST", "/v1/jobs?kind=diff", &[FORM], &unstored);
+        let waiting =
+            [of_upload, of_stored, of_unstored, picture].map(|job| job.header("location").unwrap().to_owned());
         server.kill_9();
         server.wait();
-        ([vec![ended], waiting.to_vec()].concat(), told, heat)
+        ([vec![ended], waiting.to_vec()].concat(), told, told_of_unstored, heat)
     };
     let server = durable::start(folder.path(), &["--workers", "1"]);
-    let expected = [(422, &told.body), (200, &told.body), (200, &told.body), (200, &heat.body)];
+    let expected =
+        [(422, &told.body), (200, &told.body), (200, &told.body), (200, &told_of_unstored.body), (200, &heat.body)];
     for (job, (status, body)) in jobs.iter().zip(expected) {
         let state = server.request("GET", job, &["Prefer: wait=60"], b"").json();
         assert_eq!(state["state"], "done", "{state}");
         let result = server.get(&format!("{job}/result"));
         assert_eq!((result.status, &result.body), (status, body));
     }
-    assert_eq!(jobs.len(), 4);
+    assert_eq!(jobs.len(), 5);
 }
 
 #[test]

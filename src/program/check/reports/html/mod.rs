@@ -1,4 +1,5 @@
-//! The verdicts as one page, which needs no network: a table of the files with a filter, and the faults of each.
+//! The report of `meshsnap check` as one HTML page, which needs no network: a table of the files with a filter, and
+//! for each file its faults, its changes and its pictures.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,7 @@
-//! Lists of items per band of rows.
+//! Lists of numbered items (edges, or pieces of clipped triangles), one per band. A band is a range of pixel rows
+//! that one thread draws at a time.
+//!
+//! An item is in the list of each band that it touches. Items that touch many bands are listed once for all of them.
 
 /// The items of one chunk, listed per band.
 #[derive(Default)]
@@ -6,12 +9,12 @@ pub struct Bin {
     by_band: Vec<Vec<u32>>,
     /// Items that touch many bands, with the first and last.
     tall: Vec<(u32, [u32; 2])>,
-    /// Number of bands from which an item is tall.
+    /// An item is tall if it touches more bands than this.
     tall_bands: usize,
 }
 
 impl Bin {
-    /// Empty lists; what touches `tall_bands` bands is listed once for all of them.
+    /// Empty lists; what touches more than `tall_bands` bands is listed once for all of them.
     pub fn new(bands: usize, tall_bands: usize) -> Self {
         Self { by_band: vec![Vec::new(); bands], tall: Vec::new(), tall_bands }
     }

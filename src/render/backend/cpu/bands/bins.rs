@@ -1,4 +1,9 @@
-//! Sorting of triangles and edges into bands of rows, before stage visibility.
+//! The sorting of triangles and edges into bands, before the stage visibility. A band is a range of pixel rows that
+//! one thread draws at a time. For each band, only the triangles and edges that touch it are looked at.
+//!
+//! Rims are the edges at which a surface ends on screen or turns away. If a pass of lines draws all edges of a
+//! surface, its rims are listed apart from its other edges, because few bands need the others (`lines/holes` draws
+//! most pixels without them). The others are sorted when the first band needs them.
 
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -14,7 +19,7 @@ use crate::backend::cpu::threads::{CHUNK, map};
 use crate::limits::Stopped;
 use crate::plan::{DrawPlan, Edge, Faces, HullPass, LinePass, pass_mask};
 
-/// Edges that touch this many bands are listed once for all of them.
+/// Edges that touch more than this many bands are listed once for all of them.
 const TALL_EDGE_BANDS: usize = 4;
 
 /// Items per band, chunk by chunk in ascending order.

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use crate::backend::cpu::isa::LANES;
 
-/// Triangles that touch this many bands are listed once for all of them. Otherwise large ones on a
+/// Triangles that touch more than this many bands are listed once for all of them. Otherwise large ones on a
 /// tall picture would take gigabytes of lists.
 pub const TALL_BANDS: usize = 4;
 

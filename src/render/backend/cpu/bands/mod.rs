@@ -1,7 +1,7 @@
-//! All stages of a band of rows, from visibility to resolve.
+//! The drawing of one band, through all stages from visibility to resolve. A band is a range of pixel rows, most
+//! often so few that its buffers fit a core's cache. It depends on no other band, so threads draw several at a time.
 //!
-//! A band fits a core's cache and depends on no other band. [`bins`] sorts triangles and edges into
-//! bands, [`scratch`] holds a band's buffers.
+//! [`bins`] sorts triangles and edges into bands, [`scratch`] holds a band's buffers.
 
 mod bin;
 pub(crate) mod bins;

@@ -1,5 +1,7 @@
-//! The height of bands, which follows from the memory that a band may take, and the buffers that a
-//! thread draws a band in.
+//! The height of bands, and the buffers in which a thread draws one. A band is a range of pixel rows that one thread
+//! draws at a time. Its height follows from the memory that it may take.
+//!
+//! Buffers that are not too large are kept for the next picture.
 
 use std::sync::{Mutex, PoisonError};
 

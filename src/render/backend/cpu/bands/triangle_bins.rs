@@ -1,4 +1,9 @@
-//! Sorting of triangles into bands of rows, before the stage visibility.
+//! The triangles that touch each band, before the stage visibility. A band is a range of pixel rows that one thread
+//! draws at a time.
+//!
+//! There are separate lists of triangles that face the viewer, that face away, and that are thin, and of the pieces
+//! that are left of triangles after clipping. Later stages treat these differently. The mesh's triangles are taken in
+//! chunks, so that several threads can sort them.
 
 use std::ops::Range;
 
@@ -51,7 +56,7 @@ impl TriangleBin {
             let Some(faces) = pass.faces_of(plan, id as usize) else { continue };
             bin.push_clipped(context, &bounds, id, faces);
         }
-        // Nobody asks for these.
+        // Only their lists by band are read.
         bin.thin.all = Vec::new();
         bin
     }

@@ -1,6 +1,8 @@
-//! Stage visibility, many triangles at a time: set-up in lanes, and a short way for small ones.
+//! The drawing of triangles in batches (stage visibility, which finds the nearest triangle of each sample). Eight
+//! triangles at a time are made ready in vector instructions. Then small ones are drawn, sorted by size, so that the
+//! processor predicts the lengths of loops.
 //!
-//! Larger triangles are drawn in the blocks of `visibility`.
+//! Larger triangles are drawn in the blocks of 8 x 8 pixels that `visibility` finds.
 
 use fearless_simd::prelude::*;
 

@@ -1,10 +1,15 @@
-//! Stages transform and visibility: from vertices to the nearest triangle of each sample.
+//! The stages transform and visibility: from vertices to the nearest triangle of each sample. A sample is one of the
+//! 1 to 16 places in a pixel at which the picture is computed.
 //!
-//! [`transform`] moves vertices to snapped screen coordinates, [`clip`] cuts what reaches behind
-//! the eye, [`visibility`] finds the samples of a triangle ([`batch`] those of eight small ones), and
-//! [`nearest`] keeps the nearest of them in the buffer of [`samples`]. [`tiles`] tell what lies
-//! behind them, [`steepness`] how fast depth changes. Integers and single roundings decide everything here, so that
-//! both back-ends agree on every sample. Twins are in `shaders/geometry/`.
+//! - [`transform`] moves vertices to screen coordinates, which are rounded to 1/256 px.
+//! - [`clip`] cuts off what reaches behind the eye.
+//! - [`visibility`] finds the samples that a triangle covers, [`batch`] does so for many triangles.
+//! - [`nearest`] keeps the nearest triangle of each sample in the buffer of [`samples`].
+//! - [`tiles`] hold the farthest depth in each square of pixels, to find triangles that are hidden there.
+//! - [`steepness`] tells how fast a triangle's depth changes on screen.
+//!
+//! Integers and single roundings decide everything here, so that both back-ends agree on every sample. Twins are in
+//! `shaders/geometry/`.
 
 pub(crate) mod batch;
 pub(crate) mod clip;

@@ -1,5 +1,5 @@
-//! Stage visibility, per sample: keeps the triangle that is nearest to the viewer. Of equal depths
-//! the lower id is kept.
+//! The depth test of the stage visibility: of all triangles at a sample, the one nearest to the viewer is kept. Of
+//! equal depths the lower id is kept, so that the order of drawing does not matter.
 
 use super::samples::SampleBand;
 use super::visibility::Target;

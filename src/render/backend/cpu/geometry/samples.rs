@@ -1,4 +1,5 @@
-//! Stage visibility: the buffer of a band, with the triangle id and depth of every sample.
+//! The visibility buffer of a band (a range of pixel rows): the id and the depth of the nearest triangle at every
+//! sample. A pixel has 1, 4, 8 or 16 samples.
 
 use crate::backend::cpu::isa::LANES;
 

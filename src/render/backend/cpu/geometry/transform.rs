@@ -1,8 +1,9 @@
-//! Stage transform, per vertex: unit box to snapped screen coordinates. Twin of
-//! `shaders/geometry/transform.wgsl`.
+//! The transform of vertices from the mesh's unit box to screen coordinates and depth (stage transform). Screen
+//! coordinates are rounded to whole 1/256 px. Twin of `shaders/geometry/transform.wgsl`.
 //!
-//! Bit-exact on every machine and on both back-ends: only `+ - *`, each rounded by itself
-//! (docs/rasterizer.md, "Rounded operations").
+//! The results have the same bits on every machine and on both back-ends: only `+ - *` are used, each rounded by
+//! itself (docs/rasterizer.md, "Rounded operations"). Reciprocals and roots of this kind are here too; other stages
+//! use them.
 
 use crate::backend::cpu::isa::{LANES, dispatch};
 use crate::plan::Projection;

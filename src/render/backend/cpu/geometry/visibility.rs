@@ -1,9 +1,9 @@
-//! Stage visibility, per triangle: the samples that it covers, and its depth at each. Twin of
+//! The samples that a triangle covers, and its depth at each (stage visibility). Twin of
 //! `shaders/geometry/visibility.wgsl`.
 //!
-//! Coverage is exact integer arithmetic on snapped vertices with the top-left rule: of two
-//! triangles that share an edge, every sample belongs to exactly one. Depth is evaluated from
-//! integer offsets, never incrementally, so it does not depend on where a traversal began.
+//! Coverage is exact integer arithmetic on vertices that are rounded to 1/256 px, with the top-left rule: of two
+//! triangles that share an edge, every sample belongs to exactly one. Depth is evaluated from integer offsets, never
+//! incrementally, so it does not depend on where a traversal began.
 
 use super::samples::SampleBand;
 use super::transform::{ScreenVertex, recip};

@@ -1,6 +1,6 @@
-//! Stage lines, per edge: decides whether the edge is drawn in this view. A pass of contours keeps
-//! only silhouettes, and on closed surfaces an edge is dropped if all its faces face away from the
-//! viewer. Twin of `shaders/lines/contour.wgsl`.
+//! The decision whether an edge is drawn in this view (stage lines). A pass of contours keeps only silhouettes, the
+//! edges at which the surface ends on screen or turns away. On closed surfaces an edge is dropped if all its faces
+//! face away from the viewer. Twin of `shaders/lines/contour.wgsl`.
 
 use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous};

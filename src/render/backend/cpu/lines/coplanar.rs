@@ -1,10 +1,9 @@
-//! Stage lines, per edge and triangle: edges that lie in the plane of a triangle that hides their
-//! faces. Twin of `shaders/lines/coplanar.wgsl`.
+//! A special case of hidden lines: edges that lie in the plane of a triangle which hides the edges' own faces (stage
+//! lines). Such a triangle hides the edge, too. Twin of `shaders/lines/coplanar.wgsl`.
 //!
-//! An example is the edge at which a wall stands on a floor: it lies in the floor's plane. Seen
-//! from above the edge is visible, and hidden-line removal keeps it however depths are rounded.
-//! Seen from below, the floor hides the wall. So it has to hide the edge too, though both have the
-//! same depth.
+//! An example is the edge at which a wall stands on a floor: it lies in the floor's plane. Seen from above the edge
+//! is visible, and hidden-line removal keeps it however depths are rounded. Seen from below, the floor hides the
+//! wall. So it has to hide the edge too, though both have the same depth.
 
 use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::steepness::{Corner, NEARER_RATIO, sides};

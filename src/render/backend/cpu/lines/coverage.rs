@@ -1,14 +1,14 @@
-//! Stage lines, per pixel: the coverage by the union of all strokes, and the lines' colour
-//! composited over the pixel. Twin of `shaders/lines/coverage.wgsl`.
+//! The share of a pixel that lines cover, and the compositing of their colour over the pixel (stage lines). Twin of
+//! `shaders/lines/coverage.wgsl`.
 //!
-//! A stroke is what one edge's line covers. Four integers per pixel describe all its strokes: the
-//! sum of their areas, the sum of the numbers of coverage points in them, the mask of the points
-//! that any of them covers, and the largest difference between a stroke's area and its points.
-//! Integers can be summed in any order, so the result does not depend on the order of the strokes.
+//! A stroke is the area that one edge's line covers, and a pixel is covered by the union of its strokes. A pixel has
+//! 256 coverage points, which show where strokes overlap. Four integers per pixel describe all its strokes: the sum
+//! of their areas, the sum of the numbers of points in them, the mask of the points that any of them covers, and the
+//! largest difference between a stroke's area and its points. Integers can be summed in any order, so the result does
+//! not depend on the order of the strokes.
 //!
-//! If strokes do not overlap, the coverage is the sum of their areas. If they overlap, the sum is
-//! scaled by the number of points that any stroke covers over the sum of the strokes' points
-//! ([`LineCoverage::covered_share`]).
+//! If strokes do not overlap, the coverage is the sum of their areas. If they overlap, the sum is scaled by the
+//! number of points that any stroke covers over the sum of the strokes' points ([`LineCoverage::covered_share`]).
 
 use super::holes::Holes;
 use super::stroke::{Amount, Mask, POINTS, WORDS, count};

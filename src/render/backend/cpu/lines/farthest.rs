@@ -1,6 +1,5 @@
-//! Stage lines, per pixel: the farthest depth of all triangles that are visible in the pixel. An
-//! edge that is farther than this in every pixel along it is hidden, and no triangle has to be
-//! tested.
+//! The depth of the farthest corner of all triangles that are visible in a pixel (stage lines). An edge that is
+//! farther away than this in every pixel along it is hidden, and no triangle has to be tested.
 
 use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};

@@ -1,8 +1,8 @@
-//! Stage lines, per piece of an edge: hidden-line removal, which finds the intervals that no
-//! triangle hides. Twin of `shaders/lines/hidden_lines.wgsl`.
+//! Hidden-line removal (stage lines): it finds the intervals of an edge that triangles hide, and from them the
+//! visible ones. Twin of `shaders/lines/hidden_lines.wgsl`.
 //!
-//! On screen an edge and a triangle are straight and their depths are affine, so what a triangle
-//! hides of an edge is an interval. Candidates are the triangles that the visibility buffer shows
+//! On screen an edge and a triangle are straight and their depths are affine, so what a triangle hides of an edge is
+//! an interval. Candidates are the triangles that the visibility buffer (the nearest triangle of each sample) shows
 //! along the edge.
 
 use super::candidates::Candidates;

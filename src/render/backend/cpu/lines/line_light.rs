@@ -1,10 +1,10 @@
-//! Stage lines, per pixel: the light on lines that are lit like the surface. Twin of
+//! The light on lines that are lit like the surface, per pixel (stage lines). Twin of
 //! `shaders/lines/line_light.wgsl`.
 //!
-//! Light changes a colour by a factor and a summand ([`Light`]), so one light per pixel does for
-//! lines of all colours. It is the mean of the light at those samples that show the surface. If no
-//! sample does, as just outside a silhouette, it is the light on the line's own face. Normal and
-//! roughness textures do not change the light on lines.
+//! Light changes a colour by a factor and a summand ([`Light`]), so one light per pixel does for lines of all
+//! colours. It is the mean of the light at those samples that show the surface. If no sample does, as just outside a
+//! silhouette, it is the light on the line's own face. Normal and roughness textures do not change the light on
+//! lines.
 
 use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;

@@ -1,13 +1,13 @@
-//! Stage lines: lines of exact width.
+//! The stage lines: edges are drawn over the colours as lines of exact width.
 //!
-//! For each [`edge`], [`contour`] tells if it is drawn in this view, [`segment`] is its position on
-//! screen, and [`hidden_lines`] finds the intervals to draw. Each interval is a [`stroke`] in the
-//! pixels that it touches; its area comes from [`profile`]. [`coverage`] unites a pixel's strokes
-//! and composites them over the colours, under the light of [`line_light`]. Twins are in
-//! `shaders/lines/`.
+//! For each [`edge`], [`contour`] tells if it is drawn in this view, [`segment`] is its position on screen, and
+//! [`hidden_lines`] finds the intervals to draw. Each interval is a [`stroke`]: the area within half the line's width
+//! of it. Its area in a pixel comes from [`profile`]. [`coverage`] unites a pixel's strokes and composites them over
+//! the colours, under the light of [`line_light`]. Twins are in `shaders/lines/`.
 //!
-//! Most pixels need no strokes where all edges of a surface are drawn: [`holes`] in its faces are
-//! what its lines leave free. Only the pixels near rims get strokes then.
+//! Where all edges of a surface are drawn, most pixels need no strokes: [`holes`] finds the parts of faces that lines
+//! leave free, and all else is covered. Mainly the pixels near rims, where the surface ends on screen, get strokes
+//! then.
 
 pub(crate) mod candidates;
 pub(crate) mod contour;

@@ -1,6 +1,5 @@
-//! Stage lines, per line and pixel: the area of the pixel that a long straight line covers, from
-//! the distance between the line and the pixel's centre. Twin of `strip_area` in
-//! `shaders/lines/stroke.wgsl`.
+//! The area of a pixel that a long straight line covers, as a function of the distance between the line and the
+//! pixel's centre (stage lines). Twin of `strip_area` in `shaders/lines/stroke.wgsl`.
 
 /// Coverage of a pixel's box by a strip, as a function of the distance between their centres.
 ///

@@ -1,5 +1,5 @@
-//! Stage lines, per edge: the edge's ends on screen, and the walk over the pixels along it. Twin of
-//! `shaders/lines/segment.wgsl`.
+//! An edge on screen: its ends, its depth at each point along it, and the pixels that it passes (stage lines). Twin
+//! of `shaders/lines/segment.wgsl`.
 
 use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::clip::clip_segment;

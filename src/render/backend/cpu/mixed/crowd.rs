@@ -1,5 +1,8 @@
-//! Stage mixed, per pixel: the nearest face at each point, with one depth and one id per point. For
-//! pixels with more faces than [`faces`](super::faces) has room for, and for tests.
+//! The nearest triangle at each point of a mixed pixel, kept as one depth and one id per point (stage mixed). Mixed
+//! pixels are drawn a second time, from 64 or 256 points each, because faces of different colours meet there.
+//!
+//! This serves pixels that show more faces than [`faces`](super::faces) has room for or have more triangles than a
+//! list holds, and tests.
 
 use super::points::{Lattice, PointSet};
 use super::shares::{Share, Shares};

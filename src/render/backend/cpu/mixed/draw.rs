@@ -1,6 +1,6 @@
-//! Stage mixed, per band: finds the band's mixed pixels and computes their colours.
+//! The stage mixed for one band (a range of pixel rows): it finds the band's mixed pixels and computes their colours.
 //!
-//! A mixed pixel is one in which faces of different colours meet. The few samples that all pixels
+//! A mixed pixel is one in which, or beside which, faces of different colours meet. The few samples that all pixels
 //! have are not enough there. So its colour is computed once more, from 64 or 256 points.
 
 use super::band_triangles::BandTriangles;

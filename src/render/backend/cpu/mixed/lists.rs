@@ -1,5 +1,5 @@
-//! Stage mixed, per band: for each mixed pixel of a batch, the list of the triangles that may be
-//! visible in it.
+//! Lists of the triangles that may be visible in each mixed pixel (stage mixed). Mixed pixels are drawn a second
+//! time, from 64 or 256 points each; lists are made for up to 4096 of them at a time.
 
 use std::ops::Range;
 

@@ -1,5 +1,5 @@
-//! Stage mixed: a cache of the triangles that were used last, with their edge functions set up.
-//! Neighbouring pixels mostly show the same triangles.
+//! A cache of the triangles that mixed pixels used last, with their edge functions set up (stage mixed). Mixed pixels
+//! are drawn a second time, from 64 or 256 points each, and neighbours mostly show the same triangles.
 
 use super::band_triangles::{BandTriangles, ScreenTriangle};
 use super::triangle::PointTriangle;

@@ -1,5 +1,6 @@
-//! Stage mixed, per pixel: the visible triangles of the pixel, each with its share of the pixel's
-//! points.
+//! The visible triangles of a mixed pixel, each with its share of the pixel: the set of the points that show it
+//! (stage mixed). Mixed pixels are drawn a second time, from 64 or 256 points each, because faces of different
+//! colours meet there.
 
 use super::points::PointSet;
 use crate::backend::sample_partition::POINTS;

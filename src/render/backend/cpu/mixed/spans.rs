@@ -1,5 +1,6 @@
-//! Stage mixed, per triangle and row: the columns of pixels that the triangle may touch. For a
-//! slanted triangle these are at most half of the pixels of its bounding box.
+//! The columns of pixels that a triangle may touch in a row of pixels (stage mixed). For a large slanted triangle
+//! these are about half of the pixels of its bounding box or fewer, so that fewer of the pixels that are drawn a
+//! second time have to test it.
 
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 

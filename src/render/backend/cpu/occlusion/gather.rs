@@ -1,5 +1,6 @@
-//! Stage occlusion, per pixel of every second column and row: looks at places around it and adds up what light
-//! they take. Twin of `shaders/occlusion/gather.wgsl`.
+//! The light that surfaces around a pixel block, for the pixels of every second column and row (stage occlusion,
+//! screen-space ambient occlusion). Surfaces are looked up at 16 fixed offsets from the pixel. How much light each
+//! of them blocks follows from its position in space. Twin of `shaders/occlusion/gather.wgsl`.
 
 use super::grid::{Grid, NOWHERE, PHASES, lanes};
 use crate::backend::cpu::geometry::transform::{quick_rsqrt, round_to_i32};

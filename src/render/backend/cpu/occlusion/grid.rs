@@ -1,9 +1,10 @@
-//! Stage occlusion, per pixel: writes the place of its first sample, which is its distance from the far plane towards
-//! the viewer, in pixels. Twin of `shaders/occlusion/grid.wgsl`.
+//! The depths that the stage occlusion (screen-space ambient occlusion) reads. For each pixel, the grid has the
+//! distance from the far plane to the surface that the pixel's first sample shows, in pixels. Twin of
+//! `shaders/occlusion/grid.wgsl`.
 //!
-//! In memory, every fourth column of a row lies together: these pixels look around in the same pattern, so that a vector
-//! of eight of them loads its neighbours' places at once. A border of empty places around the picture saves the test
-//! whether a neighbour lies in it.
+//! In memory, every fourth pixel of a row lies side by side. These pixels look at neighbours in the same
+//! directions, so the neighbours of eight of them are loaded as one vector. A border of empty pixels around the
+//! picture saves the test whether a neighbour lies in the picture.
 
 use std::ops::Range;
 

@@ -1,7 +1,8 @@
-//! Stage occlusion: the light that hollows go without, from the depths of the whole picture.
+//! The stage occlusion, which is screen-space ambient occlusion: it finds how much less light hollows get, from the
+//! depths of the whole picture.
 //!
-//! `grid` keeps the place of each pixel's first sample, `gather` looks at the places around it, and
-//! `spread` gives neighbours of one surface each other's results.
+//! `grid` keeps the depth of each pixel's first sample as a distance in pixels. `gather` adds up the light that
+//! surfaces around a pixel block. `spread` smooths this by means over neighbours that show the same surface.
 
 pub mod gather;
 pub mod grid;

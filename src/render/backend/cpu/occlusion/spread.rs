@@ -1,5 +1,6 @@
-//! Stage occlusion, per pixel: smooths the darkness of hollows, by a weighted mean over the neighbours that show the same
-//! surface. Twin of `shaders/occlusion/spread.wgsl`.
+//! The smoothing of the darkness of hollows, by a weighted mean over the neighbours that show the same surface
+//! (stage occlusion, screen-space ambient occlusion). It also gives a value to the pixels between those that
+//! `gather` looks at. Twin of `shaders/occlusion/spread.wgsl`.
 
 use super::grid::{Grid, NOWHERE, PHASES, lanes};
 use crate::backend::cpu::geometry::transform::round_to_i32;

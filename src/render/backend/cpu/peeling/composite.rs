@@ -1,9 +1,10 @@
-//! Stage shade, per sample: composites the peeled layers front to back, then the surface under
-//! them. Twin of `shaders/peeling/composite.wgsl`.
+//! The compositing of the transparent layers of each sample, front to back, and then of the surface under them (stage
+//! shade). Twin of `shaders/peeling/composite.wgsl`.
 //!
-//! Depth peeling (Everitt 2001, "Interactive order-independent transparency"), for each sample by
-//! itself: a round finds the greatest word (depth, lowest id) below the last round's, all words
-//! above the visibility buffer's.
+//! Layers are found by depth peeling (Everitt 2001, "Interactive order-independent transparency"), for each sample by
+//! itself. Depth and triangle id make a word that is greater for what is nearer, and of equal depths for the lower
+//! id. A round finds the greatest word below the last round's. All words are above that of the opaque surface in the
+//! visibility buffer, unless wires show through the surface.
 
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::context::RasterContext;

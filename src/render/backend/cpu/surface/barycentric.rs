@@ -1,4 +1,5 @@
-//! Stage shade, per point: its position in its triangle, for `N` points side by side. Twin of
+//! Barycentric coordinates of shaded points: where each point lies in its triangle, in perspective, and how that
+//! changes from pixel to pixel (stage shade). They are computed for `N` points side by side. Twin of
 //! `shaders/surface/barycentric.wgsl`.
 
 use crate::backend::cpu::context::RasterContext;

@@ -1,5 +1,5 @@
-//! Stage shade, per point: debug views, which show a triangle's numbers as colours. Twin of
-//! `shaders/surface/debug.wgsl`.
+//! Debug views, which show a triangle's numbers as colours: barycentric coordinates, normals, texture coordinates and
+//! others (stage shade, per point). Twin of `shaders/surface/debug.wgsl`.
 
 use super::barycentric::{Corners, edge_distances_px};
 use super::light::{light, lit};

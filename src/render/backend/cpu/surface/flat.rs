@@ -1,5 +1,6 @@
-//! Stage shade, per triangle: colours that are the same all over a triangle. Each is found once,
-//! eight at a time, and pixels look them up.
+//! The shading of triangles whose colour is the same all over, because their material has no textures, smooth normals
+//! and the like (stage shade). Each colour is found once, eight triangles at a time, and pixels look it up. This is
+//! used for pictures in which all colours are like this.
 
 use super::flat_colors::{FlatColors, UNKNOWN};
 use super::flat_lanes;

@@ -1,4 +1,4 @@
-//! The colours of triangles that are the same all over each of them. `flat` finds and shows them.
+//! The table of the colours of triangles that have one colour all over, by triangle id. `flat` fills and uses it.
 
 /// Marks a colour that is computed per pixel: the triangle is clipped, or its colour is not finite
 /// (infinity times a weight of 0 is not 0).

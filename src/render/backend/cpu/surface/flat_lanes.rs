@@ -1,4 +1,5 @@
-//! Stage shade: steps of `flat` in vectors. Compilers make branches and single lanes of loops.
+//! Steps of `flat`, which shades triangles of one colour each, in vector instructions (stage shade). From plain
+//! loops, compilers would make slower code here, with branches and one value at a time.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x4, f32x8, i32x8, mask32x4, mask32x8, u32x8};

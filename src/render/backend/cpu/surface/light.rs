@@ -1,11 +1,11 @@
-//! Stage shade, per point: light without images. Twin of `shaders/surface/light.wgsl`.
+//! The light of lamps and sky at a point of a surface, without an image of the surroundings (stage shade). Twin of
+//! `shaders/surface/light.wgsl`.
 //!
-//! Lambert plus the GGX lobe for each lamp, and a sky that is brighter than the ground. Metals have
-//! no diffuse colour, so they mirror surroundings instead: a dark room with three bright windows, blurred by
-//! roughness.
+//! Lambert plus the GGX lobe for each lamp, and a sky that is brighter than the ground. Metals have no diffuse
+//! colour, so they mirror surroundings instead: a dark room with three bright windows, blurred by roughness.
 //!
-//! Both back-ends compute the same bits: a whole flat face has one light, and that may lie on the
-//! threshold between two bytes.
+//! For faces that have one normal, both back-ends compute the same bits. Such a face has the same light all over.
+//! If its colour lies on the threshold between two bytes, a different last bit would change all its pixels.
 
 use crate::backend::cpu::geometry::transform::quick_recip;
 use crate::backend::cpu::vector::dot;

@@ -1,9 +1,10 @@
-//! Stage shade: from visible samples to colours.
+//! The stage shade: from visible samples to colours.
 //!
-//! [`together`] groups a pixel's samples by triangle, eight pixels at a time, and [`shade`] those of a pixel by itself.
-//! [`point`] shades each group once, at the mean of its samples; groups of a band are [`waiting`] until many are
-//! shaded together. The rest is its formulas: [`barycentric`] coordinates, [`texture`] lookups, the [`normal`],
-//! [`light`], [`occlusion_texture`], [`wire`] and [`debug`] views. Twins are in `shaders/surface/`.
+//! The samples of a pixel that show the same triangle form a group, which is shaded once, at the mean of its
+//! samples. [`together`] finds the groups of eight pixels at a time, and [`shade`] those of a single pixel. Groups
+//! of a band are [`waiting`] until [`point`] shades many of them together. It uses the formulas of [`barycentric`]
+//! coordinates, [`texture`] lookups, the [`normal`], [`light`], [`occlusion_texture`], [`wire`] and [`debug`]
+//! views. `flat` serves pictures in which each triangle has one colour. Twins are in `shaders/surface/`.
 
 pub(crate) mod barycentric;
 pub(crate) mod debug;

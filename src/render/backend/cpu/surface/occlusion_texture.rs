@@ -1,4 +1,4 @@
-//! Stage shade, per point: the file's occlusion texture, which darkens ambient light and no other.
+//! The effect of a mesh file's occlusion texture, which darkens ambient light and no other (stage shade, per point).
 //! Twin of `shaders/surface/occlusion_texture.wgsl`.
 
 use super::light::LightLanes;

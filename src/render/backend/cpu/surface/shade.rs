@@ -1,9 +1,9 @@
-//! Stage shade, per pixel: the colour of each visible triangle. Twin of
+//! The colour of a pixel, from the triangles that its samples show (stage shade). Twin of
 //! `shaders/surface/shade.wgsl`.
 //!
-//! Samples of a pixel that see the same triangle are shaded once, at their mean position
-//! ([`point`](super::point)), and weigh their share. With adaptive samples, metals that mirror sharply are shaded once in
-//! each quarter of a pixel.
+//! Samples of a pixel that show the same triangle are shaded once, at their mean position
+//! ([`point`](super::point)). The colour is weighted by their share of the pixel's samples. With adaptive samples,
+//! metals that mirror sharply are shaded once in each quarter of a pixel.
 
 use super::point::{PointShader, Show};
 use crate::backend::cpu::context::RasterContext;

@@ -1,7 +1,9 @@
-//! Stage shade, per eight pixels of a row: which triangles they show, where, and how much of each. What is found
-//! [waits](super::waiting) to be shaded.
+//! The search for the points to be shaded in eight pixels of a row at a time (stage shade). For each triangle that a
+//! pixel's samples show, there is one point at their mean position, with the triangle's share of the pixel. Points
+//! [wait](super::waiting) until many are shaded together.
 //!
-//! Each pixel sums up what its triangles add in the order of its samples, as [`Shader::pixel`] does.
+//! In each pixel the colours of its triangles are summed up in the order of its samples, as in [`Shader::pixel`],
+//! so that both round alike.
 
 use super::shade::{Shader, for_each_quarter, for_each_triangle};
 use super::waiting::{Point, Waiting};

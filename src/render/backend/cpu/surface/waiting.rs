@@ -1,4 +1,5 @@
-//! Stage shade: points of a band wait until there are many of one material, and are shaded together.
+//! The points of a band (a range of pixel rows) that wait to be shaded (stage shade). When there are 32 of one
+//! material, or the next point has another, they are shaded together and added to their pixels.
 
 use super::barycentric::{Barycentrics, Corners};
 use super::point::{Points, Show, is_smooth};

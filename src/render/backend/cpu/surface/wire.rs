@@ -1,4 +1,5 @@
-//! Stage shade, per point: wires from barycentric coordinates. Twin of `shaders/surface/wire.wgsl`.
+//! Wires along the edges of triangles, found at a shaded point from its barycentric coordinates (stage shade). Twin
+//! of `shaders/surface/wire.wgsl`.
 
 use super::barycentric::{Barycentrics, Quad};
 use crate::backend::cpu::context::RasterContext;

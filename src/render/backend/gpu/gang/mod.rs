@@ -1,12 +1,14 @@
-//! Gangs: jobs that share dispatches, because each alone would leave most of a large GPU idle.
+//! Gangs: groups of up to 16 jobs (one picture each) that are drawn by the same dispatches, because each job alone
+//! would leave most of a large GPU idle.
 //!
-//! A kernel that draws for a gang (shaders/gang.wgsl) has the uniforms of all its jobs, and tells their workgroups
-//! apart by the third coordinate. What kernels write lies one job after the other in the same buffers. What they read
-//! of the mesh is bound once, so the jobs of a gang draw the same mesh with the same materials: they differ in the
-//! camera, the light, the background and the size.
+//! A kernel that draws for a gang (shaders/gang.wgsl) has the uniforms of all its jobs. The third coordinate of a
+//! workgroup is the number of its job. What kernels write lies in the same buffers, one job's part after the other's.
+//! What they read of the mesh is bound once. So the jobs of a gang draw the same mesh with the same materials, in
+//! pictures of equally many pixels. They may differ in the camera, the light and the background, and in width and
+//! height.
 //!
-//! In reading order: [`seat`] (a job's share, and which jobs are alike), [`turns`] (who draws, and for whom), [`mod@draw`]
-//! (the commands).
+//! In reading order: [`seat`] (what a job brings to a gang, and which jobs can be in one gang), [`turns`] (which job
+//! draws, when, and for which others), [`mod@draw`] (the commands).
 
 mod draw;
 mod seat;

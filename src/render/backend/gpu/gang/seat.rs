@@ -1,4 +1,6 @@
-//! A job's share in a gang, and which jobs are alike.
+//! The data that a job brings to a gang (a job draws one picture; the jobs of a gang are drawn by the same
+//! dispatches): its uniforms, its dispatches, and how much they write. Also the tests whether a job may be in a
+//! gang at all, and whether two jobs are alike, so that one gang may hold both.
 
 use std::any::Any;
 use std::sync::Arc;

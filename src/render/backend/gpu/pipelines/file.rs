@@ -1,4 +1,5 @@
-//! The driver's own form of the pipelines on disk, so that the next process need not make it again.
+//! A file on disk with the compiled pipelines of one kind of GPU, in the driver's own form. The next process loads
+//! it, so that the driver need not compile these pipelines again. A checksum shows whether the file is damaged.
 
 #![allow(unsafe_code)]
 

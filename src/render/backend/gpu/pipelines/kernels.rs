@@ -1,4 +1,6 @@
-//! The files that a kernel is made of, and the buffers that are bound to it.
+//! The properties of each kernel (a compute shader with one entry point, in one of its variants): the name of the
+//! entry point, the files of shaders/ that its source consists of, its `override` constants, the buffer that is bound
+//! at each binding, and whether several jobs can share its dispatches.
 
 use super::key;
 use super::prune::pruned;

@@ -1,7 +1,7 @@
-//! The pipeline key: the features of a plan as bits.
+//! The pipeline key: one bit for each feature of a plan (what is to be drawn for one picture) that decides which code
+//! draws it, such as textures, lines or the number of samples.
 //!
-//! It is the constant `PIPELINE_KEY` of each pipeline, so that a kernel contains only the code that
-//! its plan needs.
+//! It is the constant `PIPELINE_KEY` of each pipeline, so that a kernel contains only the code that its plan needs.
 
 use crate::plan::{DrawPlan, SurfacePass, flags, slots};
 

@@ -1,7 +1,9 @@
-//! Leaves out code that a pipeline never runs, before a driver sees it.
+//! The removal of code that a pipeline never runs, before a driver sees it: blocks `if has(FLAG)` in a shader
+//! whose flag is not in the pipeline's key (the features that the pipeline is compiled for).
 //!
-//! A driver also removes what a constant switches off, but Mesa's puts functions in place of their calls first: the
-//! code that looks a texture up, five times.
+//! A driver also removes what a constant switches off. But Mesa's first copies functions to each place that calls
+//! them, even to places that it then removes. So it would copy the code of texture lookups five times, even for
+//! pictures without textures.
 
 use std::collections::HashMap;
 

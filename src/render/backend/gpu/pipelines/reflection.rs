@@ -1,7 +1,8 @@
-//! Buffers, and bits of the pipeline key, that a kernel's code uses.
+//! The buffers that a kernel's code uses, and the bits of the pipeline key (features of a picture) that it asks for,
+//! both found by reading the code as text.
 //!
-//! Only functions that the entry point calls count, however indirectly. In shaders/, what lies outside of functions
-//! begins at the start of a line, and so do functions and their closing brackets.
+//! Only functions that the entry point calls count, however indirectly. The search relies on the layout of shaders/:
+//! what lies outside of functions begins at the start of a line, and so do functions and their closing brackets.
 
 use std::collections::{HashMap, HashSet};
 

@@ -1,7 +1,8 @@
 //! The files of shaders/, and which of them a kernel consists of.
 //!
 //! WGSL has no include. The head of each file says which others it uses, and what of them: `// Uses: a.wgsl (x, y),
-//! b.wgsl or c.wgsl (z).` A kernel is its own file, the files that this one uses, those that they use, and so on.
+//! b.wgsl or c.wgsl (z).` A kernel is its own file, the files that this one uses, those that they use, and so on. Of
+//! files with an `or` between them it has one: the one that the caller has chosen, or else its own file or the first.
 
 /// The text of each file, by its path in shaders/.
 macro_rules! files {

@@ -1,4 +1,6 @@
-//! Tests that the heads of shaders say all that they use, and that [reflection](super::reflection) finds what naga finds.
+//! Tests of the text of shaders: the `// Uses:` comment of each file names all that the file uses,
+//! [reflection](super::reflection) finds the buffers and flags that naga (wgpu's parser of WGSL) finds, and a kernel
+//! is valid WGSL with or without the code of each feature.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

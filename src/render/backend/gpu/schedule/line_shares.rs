@@ -1,5 +1,6 @@
-//! Distribution of lines over threads: edges per workgroup, slices per window of an edge, and work
-//! per dispatch.
+//! The distribution of the work on lines over GPU threads: how many edges a workgroup and a dispatch take, how many
+//! slices of pixel rows a window (a range of an edge's length) is divided into, and after how much work a workgroup
+//! pauses, so that no dispatch takes too long. The dispatches of stage lines are scheduled here too.
 
 use super::CHUNK;
 use super::sizes::{DeviceTraits, has_visibility};
@@ -105,13 +106,13 @@ impl LineShares {
 fn edges_a_dispatch(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> u32 {
     // Half a pixel a step, the samples of up to three pixels in each.
     let longest = 2 * u64::from(plan.width_px + plan.height_px) * 3 * u64::from(plan.samples);
-    let key_bits = longest.saturating_mul(lines.edges.len() as u64);
+    let looks = longest.saturating_mul(lines.edges.len() as u64);
     let sides = (plan.width_px + plan.height_px).max(1);
     let long = match device.loops_are_limited {
         true => EDGE_CHUNK_LONG,
         false => (EDGE_PIXELS_LONG / sides).clamp(EDGE_CHUNK_LONG, EDGE_CHUNK),
     };
-    let most = if key_bits > BLIND_LOOKS_MAX { long } else { EDGE_CHUNK };
+    let most = if looks > BLIND_LOOKS_MAX { long } else { EDGE_CHUNK };
     lines.edges.len().min(most as usize) as u32
 }
 

@@ -1,8 +1,9 @@
-//! The dispatches for a plan, in the order of the stages: pure arithmetic, no device.
+//! The dispatches and other GPU commands that draw a plan (all that is to be drawn for one picture), in the order of
+//! the stages. They are computed by pure arithmetic, without a device.
 //!
-//! The picture is cut into horizontal bands whose sample buffer stays small, triangles into chunks
-//! whose work list does. After each chunk of a large mesh, and each band, the commands go to the
-//! device, so that no single submission takes long and the deadline is looked at in between.
+//! The picture is cut into horizontal bands, so that the sample buffer stays small. Triangles are cut into chunks, so
+//! that the work list (the large ones among them) stays small. After each chunk of a large mesh, and each band, the
+//! commands go to the device, so that no single submission takes long and the deadline is looked at in between.
 
 pub(crate) mod line_shares;
 pub(crate) mod sizes;

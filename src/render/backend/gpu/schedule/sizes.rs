@@ -1,4 +1,5 @@
-//! Limits of a device, sizes of buffers, and the rows per band that follow from them.
+//! The sizes of the GPU buffers for a picture, and the number of pixel rows in a band (the part of a picture that is
+//! drawn at a time), which follows from these sizes and the limits of the device.
 
 use super::step::Goal;
 use crate::backend::DrawError;
@@ -31,8 +32,9 @@ pub const SAMPLE_BYTES: u64 = 8;
 /// points, the most that an area differs from its points', and the area of holes.
 pub const STROKES_BYTES: u64 = 52;
 
-/// Bytes per pixel of the face that lights lines, and of the depth of those that layers tint.
+/// Bytes per pixel that name the face by which the pixel's lines are lit.
 const OWNER_BYTES: u64 = 4;
+/// Bytes per pixel of the depth of a line that layers tint.
 const DEPTH_BYTES: u64 = 4;
 
 /// Bytes at the start of the buffer of mixed pixels: their number, and what shaders/mixed/place.wgsl says.

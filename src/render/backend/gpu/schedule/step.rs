@@ -1,4 +1,5 @@
-//! The commands of a [`Schedule`](super::Schedule), and its goal.
+//! The kinds of commands, called steps, that a [`Schedule`](super::Schedule) consists of, and its goal: what they
+//! compute together, such as a picture or the visibility buffer alone.
 
 use crate::backend::gpu::pipelines::Kernel;
 
@@ -31,9 +32,9 @@ pub enum Step {
         /// Index of the step after the last of them.
         end: usize,
     },
-    /// Runs a kernel over `threads` threads with the batch at `batch`.
+    /// Runs a kernel.
     Dispatch {
-        /// Its index.
+        /// The kernel.
         kernel: Kernel,
         /// Index of its batch.
         batch: usize,

@@ -1,4 +1,5 @@
-//! Plans whose sizes and schedules are tested: the largest pictures, all kinds of lines.
+//! Made-up plans for tests of buffer sizes and schedules: pictures from one pixel to the largest, with 1 to 16
+//! samples per pixel, with thin and wide lines, with and without transparent layers.
 
 use std::sync::Arc;
 

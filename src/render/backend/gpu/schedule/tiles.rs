@@ -1,4 +1,6 @@
-//! Number of runs of the kernel that draws large triangles.
+//! The number of runs of the kernel that draws large triangles: one, or so many that none takes too long. Also the
+//! size from which a triangle counts as large. A small triangle is drawn by one thread; a large one is drawn in tiles
+//! of 64 x 64 pixels, by one workgroup or by several.
 
 use super::PIECES_MAX;
 use super::sizes::{ALONE_SIZE, Banding, DeviceTraits};

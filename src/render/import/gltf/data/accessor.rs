@@ -1,5 +1,6 @@
-//! Reads accessors. Every offset and count is checked in 64 bits, and paid for, before any data is
-//! touched.
+//! The reader of glTF accessors, which are typed arrays in the binary data of a file. Every offset
+//! and count is checked in 64 bits, and the memory is counted against the job's limit, before any
+//! data is touched.
 
 use super::attribute::{Component, INDICES, Kind, Rule, decode_unsigned};
 use super::buffers::{Buffers, View};

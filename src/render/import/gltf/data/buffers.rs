@@ -1,5 +1,9 @@
-//! Bytes of buffers and buffer views. Buffers are decoded and views decompressed on first use, so
-//! that unused ones (a texture's buffer, a file outside the upload) cost nothing.
+//! The bytes of glTF buffers and buffer views. A buffer is decoded, and a view decompressed, when
+//! something first needs it. Unused ones (a texture's buffer, a file outside the upload) therefore
+//! cost nothing.
+//!
+//! Decompression in another process is the exception: each order to it costs a process, so the
+//! first view that is needed is sent together with others.
 
 use super::meshopt;
 use crate::import::context::Context;

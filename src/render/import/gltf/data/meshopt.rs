@@ -1,9 +1,10 @@
-//! EXT_meshopt_compression and KHR_meshopt_compression: a view's bytes, packed by the meshoptimizer
-//! codec.
+//! EXT_meshopt_compression and KHR_meshopt_compression: the decompression of buffer views that the
+//! meshoptimizer codec has packed.
 //! <https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_meshopt_compression>
 //!
-//! The `meshopt` crate unpacks, which is exact. The filters that follow are our own, because those
-//! of the crate use a square root that differs between processors.
+//! The `meshopt` crate unpacks, which is exact. The filters that are then applied to the unpacked
+//! values are our own, because those of the crate use a square root that differs between
+//! processors.
 
 use super::meshopt_filters as filters;
 use crate::guard::{Panicked, guarded};

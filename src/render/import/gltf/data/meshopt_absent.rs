@@ -1,4 +1,5 @@
-//! In place of `meshopt.rs` in a build without the feature `meshopt`.
+//! The stand-in for `meshopt.rs` in a build without the feature `meshopt`. It refuses buffer views
+//! that meshoptimizer has packed, with an error that names the feature.
 
 use crate::guard::Panicked;
 use crate::import::MeshError;

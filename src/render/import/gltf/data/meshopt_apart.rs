@@ -1,5 +1,6 @@
-//! Unpacks views that meshoptimizer has packed in another process: many views in one order, because each order costs a
-//! process.
+//! The decompression, in another process, of buffer views that meshoptimizer has packed: a hostile
+//! file that makes the decoder crash there does no harm here. One order has many views, because
+//! each order costs a process.
 
 use super::meshopt::{DECODER, Packed, Unpacked, unpack};
 use crate::guard::{Panicked, guarded};

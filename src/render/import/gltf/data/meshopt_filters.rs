@@ -1,5 +1,6 @@
-//! The filters of meshopt compression, in the extension's own formulas: elements of 4 components,
-//! little-endian, in place.
+//! The filters of meshopt compression, in the extension's own formulas. A filter decodes values
+//! that are already unpacked (unit vectors, quaternions, floats or colours); they are
+//! little-endian, and are replaced in place.
 //! <https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_meshopt_compression#filters>
 
 /// Decodes octahedral unit vectors: x, y and the value that stands for 1. The fourth component

@@ -1,4 +1,5 @@
-//! Binary data: buffers and their views, decompression, accessors and the rules for attributes.
+//! The binary data of a glTF file: buffers and their views, decompression, accessors (typed arrays
+//! in a view) and the rules for their types.
 
 pub(crate) mod accessor;
 pub(crate) mod attribute;

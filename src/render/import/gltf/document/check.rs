@@ -1,5 +1,6 @@
-//! Checks the document as a whole before any data is read: references lead somewhere, and related
-//! sizes agree. Data is checked where it is read, and materials where they are used.
+//! The check of a whole glTF document (the JSON) before any binary data is read: references lead to
+//! something that exists, related sizes agree, and no node is its own ancestor. Binary data is
+//! checked where it is read, and materials where they are used.
 
 use super::lists::{Index, Lists};
 use super::schema::{Attributes, Document, MeshJson, Node, mode};

@@ -1,6 +1,6 @@
-//! Lazily parsed parts of the document: materials, textures, images, cameras and animations. An
-//! entry is parsed on first use, so that an odd value in an unused material does not refuse the
-//! file.
+//! The parts of a glTF document that are parsed lazily: materials, textures, samplers, images,
+//! cameras and animations. An entry is parsed on first use, so that an odd value in an unused
+//! material does not refuse the file.
 
 use crate::import::{MeshError, text};
 use serde::Deserialize;

@@ -1,5 +1,6 @@
-//! Metadata of a glTF document, for reports. Read from the JSON alone, independently of what is
-//! drawn.
+//! The metadata of a glTF file, for reports: the program that wrote it, its extensions, and its
+//! numbers of scenes, nodes, meshes and the like. They are read from the JSON alone, and do not
+//! depend on what is drawn.
 
 use crate::import::metadata::tidy;
 use crate::import::{FileMetadata, text};

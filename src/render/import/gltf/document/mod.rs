@@ -1,4 +1,6 @@
-//! The JSON document: measured and paid for before it is parsed.
+//! The JSON document of a glTF file. Before it is parsed, its depth is measured and the memory that
+//! parsing will take is estimated, and both are checked against the limits. A file that requires an
+//! extension is refused, unless that is read or harmless.
 
 pub(crate) mod check;
 pub(crate) mod lists;

@@ -1,4 +1,4 @@
-//! Materials, parsed on first use: an unused broken material is no error.
+//! The materials of a glTF file, each parsed on first use: an unused broken material is no error.
 
 pub(crate) mod images;
 use self::images::Images;

@@ -1,4 +1,5 @@
-//! In place of `draco.rs` in a build without the feature `draco`.
+//! The stand-in for `draco.rs` in a build without the feature `draco`. It refuses primitives that
+//! are compressed with Draco, with an error that names the feature.
 
 use std::convert::Infallible;
 use std::marker::PhantomData;

@@ -1,4 +1,5 @@
-//! A primitive: its triangles and vertices, decoded once for all its instances.
+//! A glTF primitive, which is a part of a mesh with one material: its vertices, triangles, lines
+//! and points. It is decoded once, and then added to the whole mesh once for each instance.
 
 #[cfg_attr(not(feature = "draco"), path = "draco_absent.rs")]
 pub(crate) mod draco;

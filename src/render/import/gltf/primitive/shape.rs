@@ -1,4 +1,5 @@
-//! The shape of a primitive at one node: morphed, then skinned.
+//! The shape of a glTF primitive at one node: its positions and normals after they are morphed
+//! (moved by weighted morph targets) and then skinned (moved by joints).
 
 use super::Primitive;
 use crate::import::MeshError;

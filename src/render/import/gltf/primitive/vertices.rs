@@ -1,4 +1,4 @@
-//! Vertex attributes of a primitive, from accessors or from Draco data.
+//! The vertex attributes and indices of a glTF primitive, read from accessors or from Draco data.
 
 use super::draco;
 use super::shape::Influences;

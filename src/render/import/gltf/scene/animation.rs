@@ -1,4 +1,5 @@
-//! Animation channels, sampled at one moment. glTF 2.0, 3.11 and appendix C.
+//! The values of animation channels (translation, rotation, scale, morph weights) at one moment,
+//! interpolated between the keys of a glTF file. glTF 2.0, 3.11 and appendix C.
 
 use crate::import::MeshError;
 use crate::import::context::Context;

@@ -1,4 +1,5 @@
-//! Cameras of the scene.
+//! The cameras of a glTF file's default scene. A broken one is left out with a warning, because
+//! most pictures use none of them.
 
 use crate::import::affine::Affine;
 use crate::import::context::Context;

@@ -1,4 +1,5 @@
-//! The default scene: its meshes and cameras, each with its transform.
+//! The default scene of a glTF file: the visible meshes and cameras, each with the transform from
+//! its own space to that of the scene.
 
 pub(crate) mod animation;
 pub(crate) mod cameras;

@@ -1,4 +1,5 @@
-//! The triangles, segments and points of a raw mesh.
+//! The triangles, line segments and points of an OBJ mesh. Polygons of four and more corners are
+//! split into triangles, by several threads unless that takes very much work.
 
 use super::Names;
 use crate::import::MeshError;

@@ -1,4 +1,6 @@
-//! Puts the parts of an OBJ text together to a raw mesh.
+//! The assembly of an OBJ mesh: several threads have parsed parts of the text, and here the
+//! vertices, faces and material names of the parts become one mesh. Indices are checked first,
+//! against the counts of the whole text.
 
 mod faces;
 mod names;

@@ -1,4 +1,6 @@
-//! The materials of a text: its `usemtl` names, numbered in order of first use.
+//! The material names of an OBJ text: its `usemtl` names, numbered from 1 in the order of first
+//! use. Each part of the text, parsed on its own, begins with the last material of the part before
+//! it. The number 0 is for faces before the first `usemtl`.
 
 use crate::import::MeshError;
 use crate::import::context::Context;

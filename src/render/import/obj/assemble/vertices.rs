@@ -1,5 +1,7 @@
-//! The vertices of a raw mesh: the file's positions, or one for each combination of a position
-//! with a texture coordinate and a normal.
+//! The vertices of an OBJ mesh. A corner of an OBJ face has separate indices of a position, a
+//! texture coordinate and a normal, and each combination of them becomes a vertex. Where corners
+//! have positions alone, the file's lists are taken as they are, and mostly also where the indices
+//! of each corner are equal.
 
 use super::{Names, Room};
 use crate::import::MeshError;

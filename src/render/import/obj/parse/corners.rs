@@ -1,4 +1,6 @@
-//! Faces in their plainest form: all corners alike, short indices without a sign, or relative ones.
+//! The fast parsing of an OBJ face in its most frequent form: all corners are written in the same
+//! one of the four ways `v`, `v/vt`, `v//vn` and `v/vt/vn`, and no index has more than nine digits.
+//! Any other face is left to `statement`.
 
 use super::decimal::whole;
 use super::{CORNERS_PER_POLL, Parser, PartError};

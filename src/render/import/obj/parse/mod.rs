@@ -1,5 +1,5 @@
-//! Parses one part of an OBJ text, byte by byte in one pass. What is not in its plainest form
-//! goes to [`statement`], line by line.
+//! The parser of one part of an OBJ text. Lines in their most frequent form are parsed byte by
+//! byte, in one pass. All others go to [`statement`], which is slower: it splits a line into words.
 
 mod corners;
 mod decimal;

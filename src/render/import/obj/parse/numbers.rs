@@ -1,4 +1,5 @@
-//! Lines of numbers in their plainest form: decimals with white space between them.
+//! The fast parsing of `v`, `vn` and `vt` lines of OBJ in their most frequent form: decimals with
+//! white space between them. Any other line is left to `statement`.
 
 use super::Parser;
 use super::decimal;

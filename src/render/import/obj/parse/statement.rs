@@ -1,5 +1,8 @@
-//! Any line of an OBJ text, word by word. Harmless content is dropped or completed: bytes that are
-//! not UTF-8, empty faces, partial colours.
+//! The general parsing of OBJ: any line, word by word. Lines in their most frequent form are parsed
+//! faster elsewhere (`numbers`, `corners`).
+//!
+//! Harmless content is dropped or completed: names that are not UTF-8, faces of fewer than three
+//! corners, colours that only some vertices have.
 
 use super::numbers::{opaque, upright};
 use super::{CORNERS_PER_POLL, Parser, PartError};

@@ -1,4 +1,4 @@
-//! Classes of edges.
+//! Tests of the classes of edges: which edges of small meshes belong to each.
 
 use super::*;
 use crate::limits::Budget;

@@ -1,4 +1,6 @@
-//! The width of wires whose thickness is left open: lines that let the surface be seen.
+//! The automatic width of wires (lines along the mesh's edges) whose thickness a request leaves open. It
+//! is 1 pixel. Where the picture's edges lie so close that such lines would cover more than 35 % of the
+//! surface, they become thinner, down to 0.8 pixels, and then fainter, so that the surface can be seen.
 
 mod open_edges;
 

@@ -1,5 +1,6 @@
-//! Width and opacity of lines that mark open edges: thinner and fainter where they would cover most
-//! of the surface, as on models that are put together from many open surfaces.
+//! The width and the opacity of lines that mark open edges, which are edges with a single face. Where
+//! these lines would cover more than 15 % of the surface, as on models that are put together from many
+//! open surfaces, they become thinner and then fainter, down to half their opacity.
 
 use super::{AutoWidth, STEPS, View};
 use crate::limits::{Deadline, Stopped};

@@ -1,4 +1,4 @@
-//! The width of wires whose thickness is left open.
+//! Tests of the automatic width of wires: lines cover about a third of the surface at most.
 
 use super::*;
 use crate::import::{self, Bundle};

@@ -1,4 +1,5 @@
-//! Hulls spend before they allocate, and end when the job does.
+//! Tests of the outline mesh (hull): its memory is taken from the budget before it is allocated, and the
+//! work ends when the job does.
 
 use super::*;
 use crate::import::{Bundle, import};

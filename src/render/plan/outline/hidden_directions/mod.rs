@@ -1,10 +1,10 @@
 //! Hidden directions: the directions around a vertex that its own faces cover on screen, and the
-//! silhouette edges there that these faces hide.
+//! silhouette edges there that these faces hide. Outlines need them at their corners.
 //!
-//! At a cusp, where the surface folds, a contour ends inside the shape. The fold's other silhouette
-//! edge leaves from the same vertex, and the surface hides it. The round join is left out where the
-//! vertex's own faces cover it. Between two edges that are both visible, no face of the vertex lies
-//! in front of the join.
+//! A round join fills the corner of an outline at a vertex where two silhouette edges meet. If both edges are
+//! visible, no face of the vertex lies in front of the join. But a contour can end inside the shape, at a cusp,
+//! where the surface folds. There the surface hides the second edge of the vertex, and the join is left out where
+//! the vertex's own faces cover it.
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,4 @@
-//! Directions that faces cover.
+//! Tests of the directions around a vertex that its faces cover.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -1,6 +1,6 @@
-//! Round joins of outlines: around a vertex, the triangles between the offset quads of two
-//! silhouette edges that meet there. Where the vertex's own faces hide one of the two edges, the
-//! join is left out where these faces cover it.
+//! Round joins, the corners of outlines. An outline has a quad beside each silhouette edge. Where two
+//! such edges meet in a vertex, triangles around the vertex fill what is between their quads. Where the
+//! vertex's own faces hide one of the two edges, the join is left out where these faces cover it.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 

@@ -1,4 +1,4 @@
-//! Joins around corners.
+//! Tests of round joins, the corners of outlines.
 
 use std::f64::consts::PI;
 

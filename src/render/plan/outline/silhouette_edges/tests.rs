@@ -1,4 +1,5 @@
-//! Silhouette edges that are left out early.
+//! Tests of the search for silhouette edges: edges inside a surface are left out early, and runs of faces
+//! that are tested as a whole give what their faces would give one by one.
 
 use super::*;
 use crate::import::{Bundle, import};

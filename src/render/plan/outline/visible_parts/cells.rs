@@ -1,4 +1,6 @@
-//! The cells of a grid over the picture, and marks of some of them.
+//! A grid of square cells over the picture, and marks of some of its cells. It is for the search for
+//! faces that hide an outline: cells that matter to an outline are marked, and faces that touch no marked
+//! cell are left out.
 
 use crate::plan::PX;
 

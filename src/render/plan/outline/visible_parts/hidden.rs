@@ -1,4 +1,5 @@
-//! The part of a silhouette edge that one face hides.
+//! The part of a silhouette edge that one face hides: the range of the edge on screen in which the face
+//! covers it and is nearer. What rounding may change does not count as nearer.
 
 use super::grid::ScreenFace;
 use crate::plan::outline::screen_edges::{ScreenEdge, narrow};

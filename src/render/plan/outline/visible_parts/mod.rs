@@ -1,7 +1,9 @@
-//! The parts of silhouette edges that no face hides, and what an outline beside each part covers.
+//! The parts of silhouette edges that no face hides, beside which an outline is drawn. For each part it
+//! is also found how much of the outline's width is visible, and whether the background is beside it.
 //!
-//! An outline is wider than the edge that it belongs to, and depths alone cannot tell that this
-//! edge is hidden: a face in front of it may recede faster than the outline does.
+//! Depths alone cannot tell that an edge is hidden. An outline is wider than the edge that it belongs to,
+//! and a face in front of the edge may recede faster than the outline does, so that the outline would
+//! show in front of that face.
 
 mod cells;
 mod grid;

@@ -1,4 +1,4 @@
-//! The parts of an edge that faces hide, and the parts that are left.
+//! Tests of the parts of an edge that faces hide, and of the parts that are left.
 
 use super::grid::ScreenFace;
 use super::*;

@@ -1,4 +1,5 @@
-//! Reads a request's body within its limits: size, shared memory, and time.
+//! The reading of a request's body within its limits: its size, the memory that all uploads share, its time, and its
+//! least speed. A body is a mesh file, a zip archive, or a form with files.
 
 pub mod sides;
 

@@ -1,4 +1,4 @@
-//! A body that brings two meshes, or names two that are stored.
+//! The body of a request that compares two meshes: a form that brings both, or a JSON document that names two stored ones.
 
 use axum::body::{Body, Bytes};
 use axum::extract::{FromRequest as _, Multipart, Request};

@@ -1,5 +1,5 @@
-//! Verdicts on meshes: [`check`] judges one, [`diff`] compares two. Both wait for a worker while the client waits,
-//! unless the answer is in memory, or accept a job.
+//! Verdicts on meshes: [`check`] judges one, [`diff`] compares two. Both answer while the client waits, at once if the
+//! answer is in memory, or accept a job whose answer is fetched later.
 
 pub mod check;
 pub mod diff;

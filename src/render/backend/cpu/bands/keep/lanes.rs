@@ -1,4 +1,5 @@
-//! Culling of triangles, eight at a time.
+//! Culling of eight triangles at a time, in vector instructions: it finds those that can show in the picture, and the
+//! bands (ranges of pixel rows) that they touch. The parent module says which triangles are left out.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x4, i32x8, mask32x8};

@@ -1,5 +1,9 @@
-//! Culling of triangles, before they are sorted into bands: what faces away, and what no sample can
-//! show.
+//! Culling of triangles before they are sorted into bands (ranges of pixel rows that one thread draws at a time). It
+//! leaves out triangles that turn a side to the viewer that is not drawn, and triangles that no sample can show: they
+//! are seen edge-on, or lie outside the picture, or between the rows or columns of samples.
+//!
+//! Triangles that have to be clipped are listed apart. So are thin ones that samples may miss, if samples are
+//! adaptive: the stage mixed looks for them.
 
 mod lanes;
 

@@ -1,5 +1,6 @@
-//! Stage visibility: the farthest depth in each tile of a band. A triangle behind that depth is hidden
-//! in the whole tile.
+//! The farthest depth in each tile of 8 x 8 pixels, of the triangles that are drawn so far (stage visibility). A
+//! triangle behind that depth is hidden in the whole tile, and if it is hidden in all tiles that it touches, it need
+//! not be drawn.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x4, i32x8, u32x8};

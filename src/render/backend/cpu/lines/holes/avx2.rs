@@ -1,4 +1,6 @@
-//! Vectors of eight numbers in AVX2 instructions, for `inset` and `dig`.
+//! Helpers in AVX2 instructions for eight numbers at a time: they load corners of triangles, compute reciprocals,
+//! and collect signs as bits. The modules `inset` and `dig`, which find the areas of faces that lines leave free,
+//! share them.
 
 use std::arch::x86_64::*;
 

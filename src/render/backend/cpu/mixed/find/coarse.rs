@@ -1,9 +1,9 @@
-//! Stage mixed, per pixel: a quick test that finds pixels whose faces all look alike. Such a pixel
-//! need not be drawn again, and most pixels pass.
+//! A quick test that finds pixels whose faces all look alike (stage mixed). Such a pixel need not be drawn a second
+//! time, and most pixels that show several faces pass the test.
 //!
-//! A face's [`Look`] says what decides its colour. This module remembers the looks of recent faces,
-//! rounded to bytes. A pixel passes if the bytes of its faces differ so little that the looks
-//! themselves are certainly alike. For the other pixels the caller compares the looks.
+//! A face's [`Look`] says what decides its colour. This module remembers the looks of recent faces, rounded to bytes.
+//! A pixel passes if the bytes of its faces differ so little that the looks themselves are certainly alike. For the
+//! other pixels the caller compares the looks.
 
 use super::look::{ALIKE, Look, kinds};
 use crate::backend::cpu::geometry::samples::NOTHING;

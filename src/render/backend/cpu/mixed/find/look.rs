@@ -1,8 +1,9 @@
-//! Stage mixed, per face: the look of a face, which is what decides its colour as far as that is
-//! known without shading it.
+//! The look of a face: the numbers that decide its colour, such as its material and its normals, as far as they are
+//! known without shading it (stage mixed). Where faces meet that look different, pixels are drawn a second time, from
+//! more points.
 //!
-//! Looks are only compared with each other. They consist of numbers that are equal on both
-//! back-ends to the bit. Shaded colours would not do, because their last bits may differ.
+//! Looks are only compared with each other. They consist of numbers that are equal on both back-ends to the bit.
+//! Shaded colours would not do, because their last bits may differ.
 
 use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::NOTHING;

@@ -1,11 +1,17 @@
-//! Stage mixed, per pixel: finds the mixed pixels.
+//! The search for mixed pixels (stage mixed). These are pixels in which, or beside which, faces of different colours
+//! meet; they are drawn a second time, from 64 or 256 points each.
 //!
-//! A pixel is mixed if its samples show several faces (or a face and nothing) and colours break off from one to the
-//! next ([`Pairs::step`]), or between the two samples closest to one of its sides, one in each pixel. Where an edge cuts
-//! off a corner of a pixel without parting its samples, it parts those of a neighbour: a pixel is mixed, too, if colours
-//! break off more than slightly in one of its four neighbours. Pixels that a thin triangle touches are mixed even if no
-//! sample sees it ([`thin`]).
-//! Pixels in which a layer is seen are not mixed: layers are composited sample by sample.
+//! Samples are compared in pairs: those of a pixel one after the other, and across each of its four sides the two
+//! samples closest to the side, one in each pixel. A pair is a break if its samples show different faces, or a face
+//! and nothing, whose colours do not go on from one to the other ([`Pairs::step`]). Breaks are slight or hard. A
+//! pixel is mixed if any of its pairs is a break.
+//!
+//! An edge may cut off a corner of a pixel and yet lie between none of these samples. It then lies between those of
+//! a neighbour. So a pixel is mixed, too, if one of the four pixels beside, above and below it has a hard break
+//! inside.
+//!
+//! Pixels that a thin triangle touches may be mixed even if no sample shows it ([`thin`]). Pixels in which a
+//! transparent layer is visible are not mixed: layers are composited sample by sample.
 //!
 //! Most pixels are passed over quickly: all their samples show one face ([`differing`]), or faces that look alike
 //! ([`coarse`]).

@@ -1,4 +1,6 @@
-//! Stage mixed, per pair of faces: the step of colours from one to the other, remembered from pixel to pixel.
+//! The comparison of two faces by what decides their colours: the step from one to the other is none, slight or
+//! hard (stage mixed). Where faces with a step meet, pixels are drawn a second time, from more points. Steps of
+//! recent pairs are remembered, because neighbouring pixels show the same pairs of faces.
 
 use super::coarse::CoarseLooks;
 use super::look::{Look, Step, step_of_linked};

@@ -1,5 +1,6 @@
-//! Stage mixed, per band: the list of the mixed pixels, row by row, and a bit mask of the same
-//! pixels. The mask gives the list's indices of the pixels in a range of columns.
+//! The mixed pixels of a band (a range of pixel rows), as a list row by row and as a bit mask (stage mixed). Mixed
+//! pixels are drawn a second time, from 64 or 256 points each. The mask gives the list's indices of the pixels in a
+//! range of columns.
 
 use std::ops::Range;
 

@@ -1,9 +1,8 @@
-//! Stage mixed, per triangle: finds triangles so thin that samples miss them, such as hairs and
-//! slivers, and marks the pixels that they touch.
+//! The search for pixels with triangles so thin that samples miss them, such as hairs and slivers (stage mixed). Such
+//! pixels are marked as mixed: they are drawn a second time, from more points.
 //!
-//! A thin triangle is followed along its longer side. A pixel that it touches is marked if a sample
-//! shows something behind the triangle whose colour differs from the triangle's. Only marked pixels
-//! are mixed, not their neighbours.
+//! A thin triangle is followed along its longer side. A pixel that it touches is marked if a sample shows something
+//! behind the triangle whose colour differs from the triangle's. Neighbours of these pixels are not marked.
 
 use super::breaks;
 use super::pairs::Pairs;

@@ -1,4 +1,6 @@
-//! Stage mixed, per triangle and pixel: tests of a pixel's points in AVX2 instructions, eight points at a time.
+//! Tests of a mixed pixel's points in AVX2 instructions, eight points at a time: whether they lie outside an edge of
+//! a triangle, and whether one triangle is nearer there than another (stage mixed). Mixed pixels are drawn a second
+//! time, from 64 or 256 points each.
 
 use std::arch::x86_64::*;
 

@@ -1,4 +1,5 @@
-//! Stage mixed, per triangle and pixel: tests of a pixel's points in AVX-512 instructions, sixteen points at a time.
+//! The test whether a mixed pixel's points lie outside an edge of a triangle, in AVX-512 instructions, sixteen points
+//! at a time (stage mixed). Mixed pixels are drawn a second time, from 64 or 256 points each.
 
 #![allow(unsafe_code)]
 

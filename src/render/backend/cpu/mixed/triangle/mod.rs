@@ -1,7 +1,8 @@
-//! Stage mixed, per triangle and pixel: the points that the triangle covers, and its depth at each.
+//! The points of a mixed pixel that a triangle covers, and the triangle's depth at each (stage mixed). Mixed pixels
+//! are drawn a second time, from 64 or 256 points each, because faces of different colours meet there.
 //!
-//! Points lie in the middle of 1/256 px, so edge functions are taken in halves of it. The rest is as in
-//! stage visibility: exact signs with the top-left rule, depth from offsets.
+//! Points lie in the middle of squares of 1/256 px, so their positions are counted in 1/512 px. The rest is as in
+//! the stage visibility: exact signs with the top-left rule, depth from integer offsets.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

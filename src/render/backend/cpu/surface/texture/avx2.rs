@@ -1,8 +1,9 @@
-//! Stage shade, per place of a texture: texture lookups in AVX2 and F16C instructions. A vector holds the coordinates of
-//! a place in two levels, or of two places, another the four components of a texel.
+//! Texture lookups in AVX2 and F16C instructions (stage shade). One vector holds the texture coordinates of a point
+//! in two mip levels, or of two points; another holds the four components of a texel.
 //!
-//! The same bits as [`trilinear_plainly`](super::trilinear_plainly) and [`mean_plainly`](super::mean_plainly), of which
-//! compilers make branches and single components.
+//! The results have the same bits as those of [`trilinear_plainly`](super::trilinear_plainly) and
+//! [`mean_plainly`](super::mean_plainly), from which compilers make slower code, with branches and one component at
+//! a time.
 
 use std::arch::x86_64::*;
 

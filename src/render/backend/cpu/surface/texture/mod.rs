@@ -1,7 +1,8 @@
-//! Stage shade, per point: texture lookups, for `N` points side by side. Twin of `shaders/surface/texture.wgsl`.
+//! Texture lookups at shaded points, filtered over the part of the texture that a pixel covers (stage shade). They
+//! are computed for `N` points side by side. Twin of `shaders/surface/texture.wgsl`.
 //!
-//! The same bits on both back-ends, because texels decide what a mask leaves and where nearest
-//! texels change.
+//! Both back-ends compute the same bits. A different last bit could be plain to see: it may decide whether a
+//! cut-out texture leaves a point of a face visible, or which of two texels is the nearest.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

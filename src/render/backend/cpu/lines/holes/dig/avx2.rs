@@ -1,4 +1,6 @@
-//! The inner loops of [`dig`](super) in AVX2 instructions. The results are the same as without.
+//! Two inner loops of [`dig`](super), which finds the areas of faces that lines leave free, in AVX2 instructions.
+//! One finds the pixels of a row that show a face. The other tests whether something hides the face there. The
+//! results are the same as without AVX2.
 
 use std::arch::x86_64::*;
 

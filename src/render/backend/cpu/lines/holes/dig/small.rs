@@ -1,5 +1,6 @@
-//! Faces of at most a few pixels: areas are computed only in the pixels that the inset touches,
-//! four pixels of two rows at a time.
+//! The areas that lines leave free of small faces, of up to 7 x 7 pixels (stage lines). The area of a face's inset
+//! (the part that the lines along its sides leave free) is computed only in pixels that the inset touches: four
+//! pixels of two rows at a time, or eight of one row.
 
 use super::Digger;
 use crate::backend::cpu::isa::LANES;

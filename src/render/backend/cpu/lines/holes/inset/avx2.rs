@@ -1,7 +1,8 @@
-//! Insets and their areas in AVX2 instructions. Each lane has the same result as without AVX2.
+//! Insets (the parts of faces that the lines along their sides leave free) and their areas, in AVX2 instructions.
+//! Each of eight faces or pixels has the same result as without AVX2.
 //!
-//! Written by hand because the compiler does not vectorize two steps of the plain code: the
-//! conversion of f32 to integers, and minima and maxima that treat NaN as Rust does.
+//! Written by hand because the compiler does not vectorize two steps of the plain code: the conversion of f32 to
+//! integers, and minima and maxima that treat NaN as Rust does.
 
 use std::arch::x86_64::*;
 

@@ -1,9 +1,9 @@
-//! Stage lines, per face: the part of it that its lines leave free. Twin of
-//! `shaders/lines/holes/inset.wgsl`.
+//! The inset of a face, which is the part of it that the lines along its sides leave free, and the inset's area in a
+//! pixel (stage lines). Twin of `shaders/lines/holes/inset.wgsl`.
 //!
-//! A face's inset is what lies at least half a line's width from its three sides. It is the triangle
-//! scaled about its incentre by `(r - w/2) / r`, r being the radius of the inscribed circle, and is
-//! empty where r is not larger than w/2.
+//! A face's inset is what lies at least half a line's width from its three sides. It is the triangle scaled about its
+//! incentre by `(r - w/2) / r`, r being the radius of the inscribed circle and w the line's width, and is empty where
+//! r is not larger than w/2.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

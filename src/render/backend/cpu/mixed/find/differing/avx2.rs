@@ -1,4 +1,6 @@
-//! Stage mixed, per row: tests of `differing` in AVX2 instructions, two pixels in a vector.
+//! The test of `differing` in AVX2 instructions, two pixels per vector: it finds the pixels of a row whose samples,
+//! or whose neighbours on the left and above, show different faces (stage mixed). Only these may have to be drawn a
+//! second time, from more points.
 
 use std::arch::x86_64::*;
 

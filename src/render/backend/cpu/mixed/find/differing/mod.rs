@@ -1,5 +1,6 @@
-//! Stage mixed, per row: the pixels whose samples show several faces, or another face than the closest samples of the
-//! pixels on the left and above.
+//! The search for the pixels of a row that show more than one face: in their own samples, or in the closest samples
+//! of the pixels on the left and above (stage mixed). Only there can faces of different colours meet, so that
+//! pixels have to be drawn a second time, from more points.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
