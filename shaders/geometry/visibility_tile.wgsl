@@ -1,7 +1,6 @@
-// Stage visibility, per triangle of the work list (triangles that are too large for one thread, and clipped ones):
-// a large triangle is drawn by one workgroup, in tiles of 64 x 64 pixels; the tiles of a huge one (128 px or more
-// on a side) are shared by all workgroups. No twin: on the CPU, threads do not share a triangle's pixels like
-// this.
+// Stage visibility, per triangle of the work list (triangles that are too large for one thread, and pieces that clipping has
+// left): a large triangle is drawn by one workgroup, in tiles of 64 x 64 pixels; the tiles of a huge one (128 px or more
+// on a side) are divided among all workgroups. No twin: on the CPU, threads do not divide a triangle's pixels like this.
 //
 // Uses: common.wgsl (ITEM_VECTORS, JOBS_MAX, WORKGROUP), one_job.wgsl or gang.wgsl (batch,
 // begin_job, frame, job), geometry/tile.wgsl (draw_tiles), geometry/triangle.wgsl (Setup).

@@ -1,5 +1,5 @@
 // The inset of a face (stage lines): the part of the face that the lines along its sides leave free, because it is
-// at least half a line's width from each. Also the area of an inset in a pixel. Twin of
+// at least half a line's width from all three sides. Also the area of an inset in a pixel. Twin of
 // src/render/backend/cpu/lines/holes/inset/mod.rs.
 //
 // Uses: common.wgsl (recip, rn, rn2, rn3, rsqrt), one_job.wgsl (batch, frame),

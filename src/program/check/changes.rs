@@ -1,5 +1,5 @@
-//! The changes of a mesh since a git commit, in sentences as those of `meshsnap diff`, and the mesh as it was in that
-//! commit, from which pictures of before are drawn.
+//! The changes of a mesh since a git commit (`meshsnap check --since`), as sentences in the words of `meshsnap diff`, and
+//! the mesh as it was in that commit, if it can be read: the report has pictures of it beside the new ones.
 
 use std::path::Path;
 

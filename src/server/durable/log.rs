@@ -1,9 +1,9 @@
-//! The database of the data folder (redb, a key-value database), which the code calls its log. It has the records of
-//! jobs and of stored meshes. Of the bytes that these need (meshes, pictures, documents), it has those that are small;
-//! larger ones are files (`blobs`).
+//! The database of the data folder (redb, a key-value store). The code calls it the log, after the trait `Log`. It keeps the
+//! records of jobs and of stored meshes. It also keeps the small ones among the bytes that these name (mesh files, pictures,
+//! request documents, mesh reports); larger ones are files (`blobs`).
 //!
 //! Changes are made in transactions, each whole or not at all. The thread `committer` writes them. When the server
-//! starts, it reads the database to restore jobs and meshes.
+//! starts, it reads the database to restore jobs and meshes, and removes bytes that no record names.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;

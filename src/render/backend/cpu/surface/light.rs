@@ -1,11 +1,12 @@
-//! The light of lamps and sky at a point of a surface, without an image of the surroundings (stage shade). Twin of
+//! The light of lamps and surroundings at a point of a surface, by formulas and without an image (stage shade). Twin of
 //! `shaders/surface/light.wgsl`.
 //!
-//! Lambert plus the GGX lobe for each lamp, and a sky that is brighter than the ground. Metals have no diffuse
-//! colour, so they mirror surroundings instead: a dark room with three bright windows, blurred by roughness.
+//! Lambert plus the GGX lobe for each lamp, and ambient light that is brighter from the top of the picture than from its
+//! bottom. Metals have no diffuse colour. So they also mirror surroundings that turn with the camera: a dark room with three
+//! bright windows, blurred by roughness.
 //!
 //! For faces that have one normal, both back-ends compute the same bits. Such a face has the same light all over.
-//! If its colour lies on the threshold between two bytes, a different last bit would change all its pixels.
+//! If its colour lies on the rounding threshold between two 8-bit values, a different last bit would change all its pixels.
 
 use crate::backend::cpu::geometry::transform::quick_recip;
 use crate::backend::cpu::vector::dot;

@@ -1,6 +1,6 @@
-//! The reader of glTF accessors, which are typed arrays in the binary data of a file. Every offset
-//! and count is checked in 64 bits, and the memory is counted against the job's limit, before any
-//! data is touched.
+//! The reader of glTF accessors, which are typed arrays in the binary data of a file. Memory is counted
+//! against the job's limit before it is allocated, and each range of bytes is checked, in arithmetic of
+//! 64 bits, before elements are read from it.
 
 use super::attribute::{Component, INDICES, Kind, Rule, decode_unsigned};
 use super::buffers::{Buffers, View};
