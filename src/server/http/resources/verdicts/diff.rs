@@ -1,4 +1,5 @@
-//! `POST /v1/diff`: says what differs between two meshes, as `meshsnap diff` does, or shows it.
+//! `POST /v1/diff`: the differences of two meshes, as JSON in the words of `meshsnap diff`, or as a picture of both side by
+//! side.
 
 use std::sync::Arc;
 
