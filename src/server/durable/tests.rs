@@ -350,14 +350,14 @@ fn small_bytes_that_no_record_names_go_at_the_next_start() {
     disk.log().unwrap().commit(&[&stored[..], &[Change::Accepted(Box::new(record))]].concat()).unwrap();
     let (durable, recovered) = Durable::on(Box::new(disk.log().unwrap()), Arc::new(Shelf::default())).unwrap();
     assert!(recovered.bytes(Digest::of(b"compared")).is_some(), "a job compares two meshes");
-    drop(recovered);
+    // With the records, their bytes are held.
     durable.close();
-    drop(durable);
     let mut left = disk.log().unwrap().small_digests().unwrap();
     left.sort_unstable();
     let mut expected = [Digest::of(b"named"), Digest::of(b"compared")];
     expected.sort_unstable();
     assert_eq!(left, expected);
+    drop((durable, recovered));
 }
 
 #[test]
