@@ -103,7 +103,8 @@ pub struct RenderArgs {
     /// Request document (JSON; `meshsnap serve` has its schema at /v1/schema)
     #[arg(long, value_name = "FILE.json", value_hint = ValueHint::FilePath, help_heading = LOOK, hide_short_help = true)]
     pub request: Option<PathBuf>,
-    /// Samples per pixel; adaptive: 4, and 64 or 256 points in pixels near which faces differ in colour
+    /// Samples per pixel; by default 4, or 16 in small pictures without wires; adaptive: 4, and 64 or 256 points in pixels near
+    /// which faces differ in colour
     #[arg(long, value_name = "N", value_parser = ["adaptive", "1", "4", "8", "16"], help_heading = LOOK, hide_short_help = true)]
     pub samples: Option<String>,
 

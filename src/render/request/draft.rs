@@ -43,7 +43,7 @@ pub struct Draft {
     pub image: ImageSpec,
     /// Columns and rows.
     pub size_px: [u32; 2],
-    /// By default 4, unless a quality target chooses.
+    /// By default those of [`Samples::default_of`], unless a quality target chooses.
     pub samples: Dependent<Samples>,
     /// By default the server's, unless a quality target chooses.
     pub backend: Dependent<BackendChoice>,
@@ -124,7 +124,9 @@ impl Draft {
         check_camera(&self.camera)?;
         let has_lamps = self.light.preset != LightPreset::None;
         let light = Light { ambient: self.ambient.or(if has_lamps { self.light.ambient } else { 1.0 }), ..self.light };
-        let ([width_px, height_px], samples) = (self.size_px, self.samples.or(self.image.samples));
+        let [width_px, height_px] = self.size_px;
+        let has_wires = layers.wire.is_some() || materials.iter().any(|(_, layers)| layers.wire.is_some());
+        let samples = self.samples.or(Samples::default_of(self.size_px, has_wires));
         let image = ImageSpec { width_px, height_px, samples, ..self.image };
         let sheet = self.sheet.as_ref().map(|sheet| sheet.finish(&self.camera, &image, px_max)).transpose()?;
         let Self { topology, points, time_s, ground, camera, .. } = self;

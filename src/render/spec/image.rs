@@ -23,6 +23,9 @@ pub struct ImageSpec {
     pub legend: bool,
 }
 
+/// Pixels of the largest picture that has more samples by default.
+const SMALL_PX: u64 = 256 * 256;
+
 /// Visibility samples per pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -37,6 +40,13 @@ pub enum Samples {
 impl Samples {
     /// The numbers that a request may ask for.
     pub const FIXED: &'static [u32] = &[1, 4, 8, 16];
+
+    /// The samples of a picture whose request leaves them open. Steps along edges are seen most in small pictures, where
+    /// more samples cost little. Wires cover the edges, and are as exact with few samples.
+    pub(crate) fn default_of(size_px: [u32; 2], has_wires: bool) -> Self {
+        let is_small = u64::from(size_px[0]) * u64::from(size_px[1]) <= SMALL_PX;
+        if is_small && !has_wires { Self::Fixed(16) } else { ImageSpec::default().samples }
+    }
 
     /// Samples in every pixel, where adaptive ones are asked for, of pictures with something transparent or without
     /// surfaces.

@@ -84,7 +84,9 @@ impl Growth {
         for look in ["flat", "wire"] {
             self.header(&format!("Pixels a side, 70 k triangles, {look}"), &["pixels", "plan", "render", "ns/pixel"]);
             for size in [64_u32, 128, 256, 512, 1024, 2048, 4096] {
-                let [plan, render] = self.look(&mesh, &[("style", look), ("size", &size.to_string())]);
+                // By default, small pictures have more.
+                let keys = [("style", look), ("size", &size.to_string()), ("samples", "4")];
+                let [plan, render] = self.look(&mesh, &keys);
                 let ns = render * 1e6 / f64::from(size * size);
                 self.line(&format!("| {size} | {plan:.2} | {render:.2} | {ns:.0} |"));
             }

@@ -9,7 +9,7 @@ use meshsnap_render::request;
 use meshsnap_render::request::Rules;
 use meshsnap_render::spec::BackendChoice;
 use meshsnap_render::spec::color::Rgba;
-use meshsnap_render::spec::{DebugView, Layers, Spec, WireEdges, WireThickness};
+use meshsnap_render::spec::{DebugView, ImageSpec, Layers, Spec, WireEdges, WireThickness};
 
 use crate::support::shapes;
 
@@ -216,7 +216,12 @@ pub fn mesh_of(bytes: &[u8]) -> Result<Mesh, meshsnap_render::import::MeshError>
 pub fn spec(keys: &[(&str, &str)]) -> Spec {
     let keys: Vec<_> = [("view", "iso")].iter().chain(keys).map(|&(k, v)| (k.to_owned(), v.to_owned())).collect();
     let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
-    request::read(None, &keys, &rules).unwrap_or_else(|e| panic!("{e}"))
+    let mut spec = request::read(None, &keys, &rules).unwrap_or_else(|e| panic!("{e}"));
+    // Small pictures have the samples of large ones here, and so take less time.
+    if !keys.iter().any(|(key, _)| ["samples", "max_error"].contains(&key.as_str())) {
+        spec.image.samples = ImageSpec::default().samples;
+    }
+    spec
 }
 
 /// Plans with default limits.

@@ -206,8 +206,9 @@ fn image() -> Vec<Field> {
             "Short for image.width and image.height: N or WxH.";
         "image.format" |d| d.image.format, short "format", default Null;
             "null: the file extension, then the Accept header, then PNG.";
-        "image.samples" |d| d.samples, short "samples", default 4;
-            "Visibility samples per pixel. adaptive: 4, and 64 or 256 points in each pixel near which faces meet that differ in \
+        "image.samples" |d| d.samples, short "samples";
+            "Visibility samples per pixel; by default 4, and 16 in pictures of at most 65,536 pixels (256 x 256) without wires. \
+             adaptive: 4, and 64 or 256 points in each pixel near which faces meet that differ in \
              colour. Pictures with something transparent have 16, and points in pixels that show neither that nor an outline. \
              Pictures without opaque faces, or with barycentric wires that show through faces, have 16 alone, and a warning.";
         "image.max_error" |d| d.max_error, in Kind::Above0 { max: 255.0 }, short "max_error", default Null;

@@ -19,7 +19,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// The request for every file.
-const LOOK: &str = "size=64&style=smooth&background=transparent";
+const LOOK: &str = "size=64&samples=4&style=smooth&background=transparent";
 /// Extensions of files that are meshes; one of a fuzzer has none.
 const MESHES: [&str; 7] = ["obj", "stl", "ply", "off", "gltf", "glb", ""];
 /// Extensions of files that go along with a mesh, or speak of it.
