@@ -93,7 +93,7 @@ impl Spec {
         self.set("size", format!("{width_px}x{height_px}"))
     }
 
-    /// Samples per pixel.
+    /// Samples per pixel. By default 4, or 16 in pictures of at most 65,536 pixels without wires.
     #[must_use]
     pub fn samples(self, samples: Samples) -> Self {
         self.set("samples", samples.to_string())

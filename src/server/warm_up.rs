@@ -15,11 +15,14 @@ use meshsnap_render::pipeline::{self, Context, Model};
 use meshsnap_render::plan::DrawPlan;
 use meshsnap_render::request::{self, Rules, Style};
 use meshsnap_render::spec::words::Words as _;
-use meshsnap_render::spec::{BackendChoice, Spec};
+use meshsnap_render::spec::{BackendChoice, Samples, Spec};
 
 /// One triangle. The looks of a plain mesh of few triangles need no other pipelines; textures, colours, several
-/// materials and other numbers of samples do.
+/// materials and samples that a request gives do.
 const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+/// Samples per pixel of pictures that leave them open: of large ones, and of small ones.
+const SAMPLES: [u32; 2] = [4, 16];
 
 /// Triangles of a mesh that the kernels for many triangles draw.
 const MANY: usize = 5000;
@@ -79,11 +82,7 @@ fn warm(gpu: Arc<GpuHost>, deadline: &Deadline) {
         (Err(error), _) | (_, Err(error)) => return tracing::debug!(%error, "the GPU is not warmed up"),
     };
     let mut backends = Backends::new(gpu.clone(), 1);
-    let specs = Style::ALL.iter().filter_map(|&(style, _)| {
-        let keys = [("style", style), ("size", "64")].map(|(key, value)| (key.to_owned(), value.to_owned()));
-        Some((style, request::read(None, &keys, &rules).ok()?))
-    });
-    let specs: Vec<(&str, Spec)> = specs.collect();
+    let specs = specs(&rules);
     if let Err(error) = make_ready(&gpu, &model, &specs, &limits, deadline) {
         if deadline.check().is_ok() {
             tracing::debug!(%error, "the GPU is not warmed up");
@@ -91,8 +90,13 @@ fn warm(gpu: Arc<GpuHost>, deadline: &Deadline) {
         return;
     }
     tracing::debug!(ms = began.elapsed().as_millis(), "the GPU is open");
-    // The number of triangles makes no difference but to the first kernels, which all styles share.
-    let plain = specs.iter().filter(|(_, spec)| spec.layers.wire.is_none()).take(1).map(|styled| (&large, styled));
+    // The number of triangles makes no difference but to the first kernels, which all styles of as many samples share.
+    let has_first_kernels_alone = |samples| {
+        let is_plain = |(_, spec): &&(_, Spec)| spec.layers.wire.is_none() && spec.image.samples == samples;
+        specs.iter().find(is_plain)
+    };
+    let plain = SAMPLES.map(Samples::Fixed).into_iter().filter_map(has_first_kernels_alone);
+    let plain = plain.map(|styled| (&large, styled));
     for (model, (style, spec)) in specs.iter().map(|styled| (&model, styled)).chain(plain) {
         if deadline.check().is_err() || !gpu.may_have_hardware() {
             return;
@@ -105,6 +109,20 @@ fn warm(gpu: Arc<GpuHost>, deadline: &Deadline) {
     }
     tracing::info!(ms = began.elapsed().as_millis(), "the GPU is warm");
     prepare_for_load(&gpu, &[model, large], &specs, &limits, deadline);
+}
+
+/// Every style as large pictures have it, and then those that small pictures have with other samples.
+fn specs(rules: &Rules) -> Vec<(&'static str, Spec)> {
+    let [of_large, of_small] = SAMPLES;
+    let styled = |samples: u32| {
+        Style::ALL.iter().filter_map(move |&(style, _)| {
+            let keys = [("style", style), ("size", "64"), ("samples", &samples.to_string())];
+            let keys = keys.map(|(key, value)| (key.to_owned(), value.to_owned()));
+            Some((style, request::read(None, &keys, rules).ok()?))
+        })
+    };
+    let has_wires = |spec: &Spec| spec.layers.wire.is_some();
+    styled(of_large).chain(styled(of_small).filter(|(_, spec)| !has_wires(spec))).collect()
 }
 
 /// Makes what pictures need that are drawn together with others. Nobody waits for that while there is little to do.

@@ -268,8 +268,11 @@ fn views(options: &Options, address: &str, meshes: &[Vec<u8>]) -> Vec<View> {
         assert!(options.style.split(',').count() <= CAMERAS, "at most {CAMERAS} styles, one for each camera");
         for camera in 0..CAMERAS {
             let turn = if options.is_turning { String::new() } else { format!("&camera.azimuth_deg={}", 20 * camera) };
-            let path =
-                format!("{url}/render.png?size={}&style={}{turn}", options.size_px, styles.next().expect("a style"));
+            let path = format!(
+                "{url}/render.png?size={}&samples=4&style={}{turn}",
+                options.size_px,
+                styles.next().expect("a style")
+            );
             all.push(View { path, picture: None });
         }
     }

@@ -103,7 +103,7 @@ pub struct RenderArgs {
     /// Request document (JSON; `meshsnap serve` has its schema at /v1/schema)
     #[arg(long, value_name = "FILE.json", value_hint = ValueHint::FilePath, help_heading = LOOK, hide_short_help = true)]
     pub request: Option<PathBuf>,
-    /// Samples per pixel; by default 4, or 16 in small pictures without wires; adaptive: 4, and 64 or 256 points in pixels near
+    /// Samples per pixel; by default 4, or 16 up to 256 x 256 pixels without wires; adaptive: 4, and 64 or 256 points in pixels near
     /// which faces differ in colour
     #[arg(long, value_name = "N", value_parser = ["adaptive", "1", "4", "8", "16"], help_heading = LOOK, hide_short_help = true)]
     pub samples: Option<String>,

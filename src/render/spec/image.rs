@@ -42,7 +42,7 @@ impl Samples {
     pub const FIXED: &'static [u32] = &[1, 4, 8, 16];
 
     /// The samples of a picture whose request leaves them open. Steps along edges are seen most in small pictures, where
-    /// more samples cost little. Wires cover the edges, and are as exact with few samples.
+    /// more samples cost little. Wires cover edges, and are as exact with few samples.
     pub(crate) fn default_of(size_px: [u32; 2], has_wires: bool) -> Self {
         let is_small = u64::from(size_px[0]) * u64::from(size_px[1]) <= SMALL_PX;
         if is_small && !has_wires { Self::Fixed(16) } else { ImageSpec::default().samples }

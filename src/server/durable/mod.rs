@@ -267,7 +267,10 @@ fn sweep(log: &mut dyn Log, blobs: &dyn Blobs, found: &HashMap<Digest, (Bytes, A
         blobs.delete(digest)?;
     }
     let small: Vec<Change> = log.small_digests()?.into_iter().filter(is_unnamed).map(Change::SmallRemoved).collect();
-    log.commit(&small)
+    if let Err(error) = log.commit(&small) {
+        tracing::warn!(%error, "bytes that no record names stay in the log until the next start");
+    }
+    Ok(())
 }
 
 /// The error for the client. The cause is in the log.

@@ -214,11 +214,12 @@ pub fn mesh_of(bytes: &[u8]) -> Result<Mesh, meshsnap_render::import::MeshError>
 
 /// Reads dotted keys that must be good. The view is `iso` where they name none.
 pub fn spec(keys: &[(&str, &str)]) -> Spec {
+    const SAMPLES_BY: [&str; 5] = ["samples", "image.samples", "max_error", "image.max_error", "image.max_time_ms"];
     let keys: Vec<_> = [("view", "iso")].iter().chain(keys).map(|&(k, v)| (k.to_owned(), v.to_owned())).collect();
     let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
     let mut spec = request::read(None, &keys, &rules).unwrap_or_else(|e| panic!("{e}"));
     // Small pictures have the samples of large ones here, and so take less time.
-    if !keys.iter().any(|(key, _)| ["samples", "max_error"].contains(&key.as_str())) {
+    if !keys.iter().any(|(key, _)| SAMPLES_BY.contains(&key.as_str())) {
         spec.image.samples = ImageSpec::default().samples;
     }
     spec

@@ -214,6 +214,7 @@ fn small_pictures_without_wires_have_16_samples() {
         (&[("size", "257x256")], 4),
         (&[("size", "4096x16")], 16),
         (&[("size", "64"), ("style", "outline")], 16),
+        (&[("size", "64"), ("style", "topology")], 16),
         (&[("size", "64"), ("style", "wire")], 4),
         (&[("size", "64"), ("style", "wireframe")], 4),
         (&[("size", "64"), ("samples", "4")], 4),

@@ -2,6 +2,7 @@
 //! or has signed the address of a picture. Where no keys are configured, everything is permitted, and clients are told
 //! apart by their addresses.
 
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -92,9 +93,11 @@ fn unix_s() -> u64 {
 /// Without keys, clients are told apart by their addresses.
 fn by_address(request: &Request) -> Owner {
     let client = request.extensions().get::<ConnectInfo<Client>>();
-    client.map_or_else(Owner::default, |ConnectInfo(client)| {
-        Owner::new(&format!("address {}", network(client.address.ip())))
-    })
+    client.map_or_else(Owner::default, |ConnectInfo(client)| of_network(client.address.ip()))
+}
+
+fn of_network(address: IpAddr) -> Owner {
+    Owner::new(&format!("address {}", network(address)))
 }
 
 /// The token that a request carries. None if it carries two, of which the crate `headers` would take the first.
@@ -108,6 +111,14 @@ fn bearer(headers: &HeaderMap) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn addresses_of_an_ipv6_network_have_one_owner() {
+        let of = |text: &str| of_network(text.parse().unwrap());
+        assert_eq!(of("2001:db8::1"), of("2001:db8::ffff:1"));
+        assert_ne!(of("2001:db8::1"), of("2001:db8:0:1::1"));
+        assert_ne!(of("10.0.0.1"), of("10.0.0.2"));
+    }
 
     #[test]
     fn only_a_bearer_token_is_one() {

@@ -11,7 +11,7 @@ use crate::http::error::ApiError;
 use crate::http::receive;
 use crate::http::state::AppState;
 
-/// Counts a request of a key, or of an address where there are no keys.
+/// Counts a request of a key, or of a client's network where there are no keys.
 pub async fn check(State(state): State<Arc<AppState>>, request: Request, next: Next) -> Result<Response, ApiError> {
     let is_work = [Method::POST, Method::PUT].contains(request.method());
     state.rates.check(&receive::access_of(&request).owner, is_work)?;

@@ -244,7 +244,7 @@ fn a_difference_is_a_job_too_and_outlives_the_process() {
         assert_eq!(server.request("GET", &ended, &["Prefer: wait=30"], b"").json()["state"], "done");
         let busy = server.post("/v1/jobs?size=4096&samples=16&style=wire", torus(60).as_bytes());
         assert_eq!(busy.status, 202);
-        server.wait_for_load(|load| load["running"] == 1);
+        server.wait_for_load(|load| load["queued"] == 0);
         let send = || server.request("POST", "/v1/jobs?kind=diff", &[FORM, "Idempotency-Key: one"], &body);
         let of_upload = send();
         assert_eq!(send().header("location"), of_upload.header("location"));
