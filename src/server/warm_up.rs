@@ -91,12 +91,10 @@ fn warm(gpu: Arc<GpuHost>, deadline: &Deadline) {
     }
     tracing::debug!(ms = began.elapsed().as_millis(), "the GPU is open");
     // The number of triangles makes no difference but to the first kernels, which all styles of as many samples share.
-    let has_first_kernels_alone = |samples| {
-        let is_plain = |(_, spec): &&(_, Spec)| spec.layers.wire.is_none() && spec.image.samples == samples;
-        specs.iter().find(is_plain)
+    let without_wires = |samples| {
+        specs.iter().find(|(_, spec)| spec.layers.wire.is_none() && spec.image.samples == Samples::Fixed(samples))
     };
-    let plain = SAMPLES.map(Samples::Fixed).into_iter().filter_map(has_first_kernels_alone);
-    let plain = plain.map(|styled| (&large, styled));
+    let plain = SAMPLES.into_iter().filter_map(without_wires).map(|styled| (&large, styled));
     for (model, (style, spec)) in specs.iter().map(|styled| (&model, styled)).chain(plain) {
         if deadline.check().is_err() || !gpu.may_have_hardware() {
             return;

@@ -160,7 +160,7 @@ dispatch! {
 #[inline(always)]
 fn places_kernel([x, y]: [i16; 2], places: &mut PerPoint) {
     for ((right, down), places) in LATTICE[0].iter().zip(&LATTICE[1]).zip(places) {
-        // Complete before it is stored: the compiler must not wonder whether a store changes the direction.
+        // Complete before it is stored: else the compiler has to assume that a store may change the direction.
         let mut row = [0; WORDS];
         for l in 0..WORDS {
             row[l] = place([x, y], [right[l], down[l]]);

@@ -3,7 +3,7 @@
 //!
 //! A kernel that draws for a gang (shaders/gang.wgsl) has the uniforms of all its jobs. The third coordinate of a
 //! workgroup is the number of its job. What kernels write lies in the same buffers, one job's part after the other's.
-//! What they read of the mesh is bound once. So the jobs of a gang draw the same mesh with the same materials, in
+//! The data of the mesh is bound once. So the jobs of a gang draw the same mesh with the same materials, in
 //! pictures of equally many pixels. They may differ in the camera, the light and the background, and in width and
 //! height.
 //!
