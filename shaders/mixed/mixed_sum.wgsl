@@ -1,7 +1,8 @@
 // The last step for mixed pixels (stage mixed), which are drawn again from 64 or 256 points because different
 // colours meet there. Each triangle visible at some of the points is a part (sometimes one in each quarter of the
-// pixel). mixed_shade.wgsl has computed the parts' colours, already weighted by their shares of the points; this
-// adds them up, in the CPU's order, and writes the pixel's colour.
+// pixel). mixed_shade.wgsl has computed the parts' colours, already weighted by their shares of the points. This
+// kernel adds them up, in the CPU's order, and writes the pixel's colour. No twin: on the CPU,
+// src/render/backend/cpu/mixed/color.rs adds up the colours as it computes them.
 //
 // Uses: common.wgsl (WORKGROUP), mixed/place.wgsl (FEW, part_at, parts_at, PARTS_OF_PIXEL,
 // pixel_at).

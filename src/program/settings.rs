@@ -14,8 +14,8 @@ use meshsnap_server::config::{Access, Config, SETTINGS, Setting};
 #[derive(Clone, Debug, Default)]
 pub struct AllSettings(Given);
 
-/// The settings of `render` and `inspect`: those whose names begin with `limit-`, except the limits
-/// of the service.
+/// The settings of `render`, `inspect`, `check` and `diff`: those whose names begin with `limit-`,
+/// except the limits of the service.
 #[derive(Clone, Debug, Default)]
 pub struct LimitSettings(Given);
 
@@ -79,11 +79,14 @@ const COMMON: &[&str] = &["listen", "workers", "queue", "backend", "no-auth", "l
 fn heading(key: &str) -> &'static str {
     match key {
         _ if key.starts_with("limit-") => "Limits",
+        _ if key.starts_with("webhook") => "Webhooks",
         "log" | "log-format" => "Log",
         "workers" | "worker-threads" | "queue" | "backend" | "cache-dir" => "Drawing",
-        "listen" | "no-auth" | "api-keys-file" | "cors-origins" | "rate-per-s" | "rate-burst" | "quota-per-day"
-        | "connections" | "header-timeout-ms" | "body-timeout-ms" => "Connections",
-        _ => "Memory",
+        "wait-ms" | "batch-wait-ms" | "overdue-grace-ms" | "drain-delay-ms" => "Times of jobs",
+        "data-dir" | "ephemeral" | "result-ttl-ms" | "unfetched-ttl-ms" | "result-bytes" | "result-count"
+        | "mesh-bytes" | "mesh-count" => "Storage",
+        "memory-bytes" | "uploads-bytes" | "resident-bytes" | "picture-bytes" => "Memory",
+        _ => "Connections",
     }
 }
 

@@ -128,7 +128,6 @@ fn faces_that_go_through_others() {
     assert_eq!(check.places.len(), 12);
     obeys(&cube().cube([0.0; 3], [0.5; 3]), "no-self-intersection");
     obeys(&cube().cube([2.0; 3], [1.0; 3]), "no-self-intersection");
-    // A side on a side.
     // A small cube that stands on a side: its foot, the sides that rise from it, and what it stands on.
     breaks(&cube().cube([1.5, 0.0, 0.0], [0.5; 3]), "no-self-intersection", 12, "12 faces intersect others");
 }

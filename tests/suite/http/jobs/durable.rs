@@ -1,4 +1,4 @@
-//! What a data folder promises: jobs, results and meshes outlive the process, however it ends.
+//! What a data folder keeps: jobs, results and meshes outlive the process, however it ends.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -173,7 +173,7 @@ fn a_terminated_server_leaves_results_for_the_next_start() {
 }
 
 #[test]
-fn stored_meshes_are_there_after_a_crash_and_deleted_ones_are_not() {
+fn stored_meshes_and_jobs_on_deleted_ones_outlive_a_crash() {
     let folder = tempfile::tempdir().unwrap();
     let large = [b"# ".repeat(100_000), b"\n".to_vec(), CUBE_OBJ.to_vec()].concat();
     let (kept, picture, deleted, job);
