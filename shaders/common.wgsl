@@ -91,7 +91,7 @@ struct Batch {
     line_slices: u32,
     // Coverage in the middle of a line.
     line_peak: f32,
-    // Units of work after which a thread pauses.
+    // Units of work after which a workgroup pauses.
     line_units: u32,
     line_pass: u32,
     // Rows that the visibility buffer holds, which may be more than the batch's, and the index of
@@ -129,8 +129,8 @@ struct Batch {
     // The line pass's, see LinePass::unseen_part_px and LinePass::farther_samples_max there.
     unseen_part: f32,
     farther_samples: u32,
-    // A gang has an array of these, whose stride must be a multiple of 16.
-    padding: u32,
+    // The place of the line pass's opacities in line_colors (coverage.wgsl); 0 if it has none.
+    line_fade: u32,
 };
 
 // Threads of a workgroup, in every kernel.

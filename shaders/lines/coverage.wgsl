@@ -5,7 +5,7 @@
 //
 // Uses: common.wgsl (ADAPTIVE, FIRST_PASS, first_visibility_sample, has, HOLED, HOLES, HULL,
 // LIT_PASS, PEELING, recip, rn, rn3, rn4, rolled_off, sample_count, SURFACE, TINTED_PASS, Vertex,
-// wide_to_f32, WORKGROUP), one_job.wgsl (batch), geometry/steepness.wgsl (NEARER_RATIO),
+// wide_to_f32, WORKGROUP), one_job.wgsl (batch, frame), geometry/steepness.wgsl (NEARER_RATIO),
 // lines/holes/free_points.wgsl (add_points), lines/stroke_words.wgsl (AREA_UNIT, AREA_WORD,
 // CARRY_WORD, COUNT_WORD, HOLE_UNIT, HOLE_WORD, MARKED, MASK_WORD, MASK_WORDS, POINTS, SLACK_WORD,
 // STROKE_WORDS, STROKED), mixed/place.wgsl (border_at, FEW, number_at), over.wgsl (background_at,
@@ -26,7 +26,9 @@
 @group(1) @binding(11) var<storage, read_write> owners: array<u32>;
 // Strokes per pixel, as stroke_words.wgsl lays them out.
 @group(1) @binding(12) var<storage, read_write> strokes: array<u32>;
-// Per pass.
+// The colour of each pass. Then, for each pass whose lines fade from place to place, a head and the opacities at the
+// points of a grid over the picture, four per vector. The head is the share of the distance between two points that
+// a pixel takes, and the number of points per row. See LineFade in src/render/plan/lines/fade.rs.
 @group(1) @binding(17) var<storage, read> line_colors: array<vec4<f32>>;
 // The band's mixed pixels, as place.wgsl lays them out.
 @group(1) @binding(22) var<storage, read> mixed: array<u32>;
@@ -80,6 +82,9 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
     }
     if cover > 0.0 {
         var color = line_colors[batch.line_pass];
+        if batch.line_fade != 0u {
+            color = rn4(color * fade_at(i));
+        }
         var under = colors[i];
         if is_composited(under) {
             under = flip_alpha_sign(under);
@@ -98,6 +103,30 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
     for (var w = 0u; w < STROKE_WORDS; w++) {
         strokes[at + w] = 0u;
     }
+}
+
+// The opacity of the pass's lines in pixel i, between the four points of the grid around it.
+fn fade_at(i: u32) -> f32 {
+    let head = line_colors[batch.line_fade];
+    let width = u32(frame.width);
+    let row = u32(batch.row_first) + i / width;
+    let place = (vec2(f32(i % width), f32(row)) + 0.5) * head.x;
+    let first = floor(place);
+    let share = place - first;
+    let columns = u32(head.y);
+    let at = u32(first.y) * columns + u32(first.x);
+    let left = between(fade_point(at), fade_point(at + columns), share.y);
+    let right = between(fade_point(at + 1u), fade_point(at + columns + 1u), share.y);
+    return between(left, right, share.x);
+}
+
+// The opacity at a point of the grid.
+fn fade_point(point: u32) -> f32 {
+    return line_colors[batch.line_fade + 1u + point / 4u][point % 4u];
+}
+
+fn between(a: f32, b: f32, share: f32) -> f32 {
+    return a + rn(share * (b - a));
 }
 
 // The colour (premultiplied) of a line in pixel i at this depth, with what lies in front of it. Its alpha is what it

@@ -263,7 +263,7 @@ fn layouts() -> Vec<(&'static str, Layout)> {
                 line_width line_smoothing line_flags line_exponent line_windows line_slices line_peak line_units
                 line_pass seen_first seen_end samples_at pass_bit layer column_first column_end seen_margin
                 alone_size groups_each cleared rgba_at slots_first slots_end list_capacity part_capacity tint_reach
-                unseen_part farther_samples padding
+                unseen_part farther_samples line_fade
             }),
         ),
         (

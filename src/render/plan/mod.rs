@@ -1,13 +1,13 @@
-//! The plan of a picture: a [`DrawPlan`] lists all that is drawn, already decided. It is made from a
-//! scene (a mesh, a request and the placed camera). Back-ends only draw it: they see slices and numbers,
-//! never a mesh or a scene.
+//! The plan of a picture: a [`DrawPlan`] lists all that is drawn, already decided. It is made from
+//! a scene (a mesh, a request and the placed camera). Back-ends only draw it: they see slices and
+//! numbers, never a mesh or a scene.
 //!
-//! [`build()`] makes the plan in stages: `primitives` (lines and points), `lines`, `surface`, `outline`
-//! (hulls) and `peeling` (transparent layers). `quality` runs before it and fills in what a request
-//! leaves open.
+//! [`build()`] makes the plan in stages, such as `primitives` (lines and points), `lines`,
+//! `surface`, `outline` (hulls) and `peeling` (transparent layers). Where a request has a quality
+//! target, `quality` first chooses the values that the request leaves open.
 //!
-//! Invariant: everything that a scene does not need is left out here, and each omission is written down
-//! in [`DrawPlan::skips`].
+//! Invariant: everything that a scene does not need is left out here, and each omission is written
+//! down in [`DrawPlan::skips`].
 
 mod build;
 mod context;
@@ -38,7 +38,7 @@ pub use build::{build, build_from, build_keeping};
 pub use error::PlanError;
 pub use framing::framing;
 pub use heat::Legend;
-pub use lines::{Edge, FaceSide, LinePass, Shown};
+pub use lines::{Edge, FaceSide, LineFade, LinePass, Shown};
 pub use outline::{HullPass, ScreenVertex};
 pub use peeling::{ALPHA_MIN, PeelingPass, TINTS, pass_mask};
 pub use prepared::{MeshToken, Prepared};

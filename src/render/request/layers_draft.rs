@@ -6,9 +6,7 @@ use super::error::{RequestError, RequestFault};
 use crate::request::style::Style;
 use crate::request::table::dependent::Dependent;
 use crate::spec::color::Rgba;
-use crate::spec::{
-    Hidden, Layers, Outline, OutlineMethod, OutlineUnit, Shading, Surface, Wire, WireEdges, WireMethod, WireThickness,
-};
+use crate::spec::{Hidden, Layers, Outline, OutlineMethod, OutlineUnit, Shading, Surface, Wire, WireEdges, WireMethod};
 
 /// Largest thickness of a wire whose method does not measure it in pixels.
 pub const MULTIPLE_MAX: f32 = 10.0;
@@ -124,8 +122,8 @@ fn xray() -> Surface {
 
 /// The lines of [`Style::Technical`]: 1 px wide, and none where the mesh only crumples.
 fn feature_edges() -> WireDraft {
-    let (edges, thickness) = (WireEdges::Feature, WireThickness::Given(1.0));
-    WireDraft { line: Wire { edges, thickness, min_length: 20.0, ..Wire::default() }, ..WireDraft::default() }
+    let line = Wire { edges: WireEdges::Feature, min_length: 20.0, ..Wire::default() };
+    WireDraft { line, ..WireDraft::default() }
 }
 
 /// The contour of [`Style::Technical`], twice as wide.

@@ -1,5 +1,6 @@
-//! The golden scenes, one test each. The CPU's picture equals the stored one to the byte, for every
-//! number of threads and every instruction set. `twins/pictures.rs` holds the GPU to the CPU.
+//! The golden scenes, one test each. The CPU's picture equals the stored one to the byte, with 1,
+//! 2, 3 and 8 threads and every instruction set of the machine. `twins/pictures.rs` holds the GPU
+//! to the CPU.
 //!
 //! A failure writes the actual, the expected and the difference picture under
 //! `target/golden-failures/NAME/`. `MESHSNAP_GOLDEN=write` stores new pictures, and then fails: a
@@ -76,6 +77,7 @@ golden_tests! {
     torus_wire_lit,
     spring_wireframe,
     sheet_boundary,
+    ball_and_box_wire_auto,
 }
 
 #[test]

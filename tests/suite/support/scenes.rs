@@ -86,7 +86,11 @@ pub const SCENES: &[Scene] = &[
         &[SIZE, ("style", "wireframe"), ("wire.color", "2060c0"), ("wire.thickness", "2")],
     ),
     scene("sheet-boundary", sheet, &[SIZE, ("style", "wire"), ("wire.edges", "boundary"), ("wire.thickness", "2")]),
+    scene("ball-and-box-wire-auto", ball_and_box, AUTO_FADE),
 ];
+
+const AUTO_FADE: &[(&str, &str)] =
+    &[SIZE, ("style", "wire"), ("wire.edges", "polygons"), ("wire.hidden", "fade"), ("wire.thickness", "auto")];
 
 const CONTOUR: &[(&str, &str)] =
     &[SIZE, ("style", "outline"), ("outline.method", "contour"), ("outline.unit", "px"), ("outline.thickness", "3")];
@@ -188,6 +192,14 @@ fn spring() -> String {
 
 fn gear() -> String {
     shapes::gear(14)
+}
+
+/// A ball of many faces beside a box, so that automatic lines are fainter over the ball.
+fn ball_and_box() -> String {
+    let mut obj = shapes::Obj::default();
+    obj.ball([-1.1, 0.0, 0.0], 1.0, 64);
+    obj.cuboid([0.2, -0.8, -0.8], [1.8, 0.8, 0.8]);
+    obj.finish()
 }
 
 fn sheet() -> String {

@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::backend::sample_partition::{POINTS, sample_partition};
 use crate::plan::{
-    DrawPlan, Edge, Faces, HullPass, Lights, LinePass, OcclusionPass, SurfacePass, TAPS, Texture, Textures,
+    DrawPlan, Edge, Faces, HullPass, Lights, LineFade, LinePass, OcclusionPass, SurfacePass, TAPS, Texture, Textures,
 };
 
 /// Uniforms of a plan.
@@ -126,7 +126,7 @@ pub struct Batch {
     pub tint_reach: f32,
     pub unseen_part: f32,
     pub farther_samples: u32,
-    pub padding: u32,
+    pub line_fade: u32,
 }
 
 /// Bits of [`Batch::line_flags`].
@@ -305,6 +305,31 @@ pub fn edge_lists(passes: &[LinePass]) -> (Vec<&[Edge]>, Vec<u32>) {
     (lists.into_iter().map(|(list, _)| &list[..]).collect(), starts)
 }
 
+/// The colours of line passes, and after them the opacities of those that fade: a head, which is the share of the
+/// distance between two points of the grid that a pixel takes and the number of points per row, and then four opacities
+/// per vector. [`fade_places`] says where each head is.
+pub fn line_colors(passes: &[LinePass]) -> Vec<[f32; 4]> {
+    let mut vectors: Vec<[f32; 4]> = passes.iter().map(|lines| lines.color).collect();
+    for fade in passes.iter().filter_map(|lines| lines.fade.as_deref()) {
+        vectors.push([1.0 / fade.spacing_px as f32, fade.columns as f32, 0.0, 0.0]);
+        let four = |four: &[f32]| std::array::from_fn(|k| four.get(k).copied().unwrap_or(1.0));
+        vectors.extend(fade.opacities.chunks(4).map(four));
+    }
+    vectors
+}
+
+/// The place of the opacities of each line pass in [`line_colors`]; 0 for a pass that does not fade.
+pub fn fade_places(passes: &[LinePass]) -> Vec<u32> {
+    let mut next = passes.len();
+    let place = |fade: Option<&LineFade>| {
+        let Some(fade) = fade else { return 0 };
+        let place = next as u32;
+        next += 1 + fade.opacities.len().div_ceil(4);
+        place
+    };
+    passes.iter().map(|lines| lines.fade.as_deref()).map(place).collect()
+}
+
 /// The points assigned to each of a pixel's samples, eight words per sample, numbered as
 /// shaders/lines/stroke.wgsl numbers them.
 pub fn sample_masks(samples: u32) -> Vec<u32> {
@@ -371,6 +396,30 @@ mod tests {
         let (lists, starts) = edge_lists(&passes);
         assert_eq!(lists.iter().map(|list| list.len()).collect::<Vec<_>>(), [5, 3, 3]);
         assert_eq!(starts, [0, 5, 0, 8, 5]);
+    }
+
+    #[test]
+    fn opacities_follow_the_colours_of_all_passes() {
+        let list = edges(1);
+        let mut passes = [0.25_f32, 0.5, 0.75].map(|red| {
+            let pass = lines(list.clone(), 1.0, Shown::All);
+            LinePass { color: [red, 0.0, 0.0, 1.0], ..pass }
+        });
+        assert_eq!((line_colors(&passes).len(), fade_places(&passes)), (3, vec![0; 3]));
+        let fade = |first: f32| {
+            let opacities = (0..6).map(|i| first + i as f32 / 16.0).collect();
+            Some(Arc::new(LineFade { spacing_px: 16, columns: 3, opacities }))
+        };
+        (passes[0].fade, passes[2].fade) = (fade(0.0), fade(0.5));
+        let (vectors, places) = (line_colors(&passes), fade_places(&passes));
+        assert_eq!(places, [3, 0, 6]);
+        assert_eq!(vectors[..3], passes.each_ref().map(|pass| pass.color));
+        for (place, first) in [(3, 0.0), (6, 0.5)] {
+            assert_eq!(vectors[place], [1.0 / 16.0, 3.0, 0.0, 0.0]);
+            assert_eq!(vectors[place + 1], [0.0, 1.0, 2.0, 3.0].map(|i| first + i / 16.0));
+            assert_eq!(vectors[place + 2], [first + 4.0 / 16.0, first + 5.0 / 16.0, 1.0, 1.0]);
+        }
+        assert_eq!(vectors.len(), 9);
     }
 
     #[test]

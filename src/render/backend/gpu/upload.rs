@@ -4,7 +4,9 @@
 
 use super::buffers::Buffers;
 use super::device::Gpu;
-use super::params::{attributes, corner_triangles, edge_lists, hull_materials, sample_masks, texture_table};
+use super::params::{
+    attributes, corner_triangles, edge_lists, hull_materials, line_colors, sample_masks, texture_table,
+};
 use super::pipelines::Slot;
 use super::residents::{ListLookup, Source};
 use super::schedule::Schedule;
@@ -82,8 +84,7 @@ pub fn upload_shading(
         let source = source.and_then(|lines| Source::of_arc(&lines.edges, size_of_val(&lines.edges[..])));
         supply(gpu, buffers, Slot::Edges, source, &slices)?;
         let gpu = &gpu.handles;
-        let colors: Vec<[f32; 4]> = plan.lines.iter().map(|lines| lines.color).collect();
-        buffers.upload(gpu, Slot::LineColors, bytemuck::cast_slice(&colors))?;
+        buffers.upload(gpu, Slot::LineColors, bytemuck::cast_slice(&line_colors(&plan.lines)))?;
         buffers.upload(gpu, Slot::SampleMasks, bytemuck::cast_slice(&sample_masks(plan.samples)))?;
         buffers.reserve(gpu, Slot::Strokes, band_pixels * STROKES_BYTES)?;
         buffers.reserve(gpu, Slot::Progress, schedule.progress_bytes)?;

@@ -4,6 +4,7 @@
 
 use std::sync::Arc;
 
+use super::auto_width::AutoWidth;
 use super::short_chains::remove_short;
 use super::styles::{LineStyle, line_styles};
 use crate::mesh::edges::EdgeList;
@@ -48,9 +49,12 @@ pub fn passes(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<Lin
     });
     let source = Source { scene, list: &list, silhouettes: silhouettes.as_deref(), contours };
     let mut passes = Vec::new();
-    for style in &styles {
+    for style in &mut styles {
         let edges = source.edges(style, cx)?;
         if !edges.is_empty() {
+            if style.fades_by_edges {
+                style.fade = AutoWidth::fade_of_features(scene, &edges, cx.deadline)?;
+            }
             let is_chosen = style.contour && source.contours.is_some();
             let mut drawn = style.passes(&edges, hides, unseen_side.filter(|_| !is_chosen));
             drawn.iter_mut().for_each(|pass| pass.contour &= !is_chosen);

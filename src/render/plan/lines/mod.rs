@@ -5,12 +5,14 @@
 
 pub(crate) mod auto_width;
 pub(crate) mod build;
+pub(crate) mod fade;
 pub(crate) mod picked_faces;
 mod short_chains;
 pub(crate) mod styles;
 
 pub use crate::mesh::edges::Edge;
 pub use build::passes;
+pub use fade::LineFade;
 
 use std::sync::Arc;
 
@@ -36,6 +38,8 @@ pub struct LinePass {
     pub smoothing_px: f32,
     /// Premultiplied linear RGBA, opacity included.
     pub color: [f32; 4],
+    /// Multiplies the colour, from place to place in the picture; None: by 1.
+    pub fade: Option<Arc<LineFade>>,
     /// The parts of the edges that are drawn, as the visibility buffer has it.
     pub shown: Shown,
     /// The side of all faces that lies inside a closed surface, on which every edge has two faces that run
@@ -67,6 +71,7 @@ impl LinePass {
             width_px,
             smoothing_px: 0.0,
             color: [1.0; 4],
+            fade: None,
             shown: Shown::All,
             unseen_side: None,
             contour: false,

@@ -10,7 +10,8 @@ use crate::mesh::creases::sharp_cos;
 use crate::mesh::edges::{EdgeList, MeshEdge};
 use crate::plan::context::PlanContext;
 use crate::plan::edges::edge_class::{Class, belongs_to, class_of};
-use crate::plan::lines::auto_width::{AutoWidth, open_edges};
+use crate::plan::lines::auto_width::{AutoWidth, OpenEdges, open_edges};
+use crate::plan::lines::fade::LineFade;
 use crate::plan::peeling::FADE;
 use crate::plan::{Edge, FaceSide, LinePass, PlanError, Shown};
 use crate::scene::{MaterialGroups, Scene};
@@ -28,6 +29,10 @@ pub struct LineStyle {
     pub smoothing_px: f32,
     /// As [`LinePass::color`].
     pub color: [f32; 4],
+    /// As [`LinePass::fade`].
+    pub fade: Option<Arc<LineFade>>,
+    /// True if the lines are to fade where the edges that have the style lie dense.
+    pub fades_by_edges: bool,
     /// Treatment of the hidden parts of edges.
     pub hidden: Hidden,
     lit: bool,
@@ -53,6 +58,8 @@ impl LineStyle {
             width_px,
             smoothing_px,
             color,
+            fade: None,
+            fades_by_edges: false,
             hidden,
             lit,
             contour,
@@ -92,7 +99,7 @@ impl LineStyle {
     pub fn settle(&mut self, scene: &Scene<'_, '_>, list: &EdgeList, deadline: &Deadline) -> Result<(), Stopped> {
         self.has_all_edges |= self.class == Class::Polygon && self.takes_all(list);
         if let Some(thinnest_px) = self.thinnest_px {
-            let AutoWidth { width_px, opacity } = open_edges(scene, list, [thinnest_px, self.width_px], deadline)?;
+            let OpenEdges { width_px, opacity } = open_edges(scene, list, [thinnest_px, self.width_px], deadline)?;
             self.width_px = width_px.min(self.width_px);
             self.color = self.color.map(|v| v * opacity);
         }
@@ -108,6 +115,7 @@ impl LineStyle {
             width_px: self.width_px,
             smoothing_px: self.smoothing_px,
             color,
+            fade: self.fade.clone(),
             shown,
             unseen_side: unseen_side.filter(|_| self.hidden == Hidden::Hide),
             contour: self.contour,
@@ -140,7 +148,7 @@ pub fn wire_color(wire: &Wire) -> [f32; 4] {
 }
 
 /// The width of a wire along edges of materials with some styles. Feature and boundary edges are taken to be
-/// few.
+/// few; the fading of features is found when these edges are.
 fn width(
     scene: &Scene<'_, '_>,
     wire: &Wire,
@@ -149,12 +157,12 @@ fn width(
 ) -> Result<AutoWidth, PlanError> {
     let are_polygons = wire.edges == WireEdges::Polygons;
     match wire.thickness {
-        WireThickness::Given(width_px) => Ok(AutoWidth { width_px, opacity: 1.0 }),
+        WireThickness::Given(width_px) => Ok(AutoWidth::opaque(width_px)),
         WireThickness::Auto if are_polygons || wire.edges == WireEdges::Triangles => {
             let style = |i: usize| scene.groups.style_of[scene.mesh.triangle_materials[i] as usize] as usize;
             AutoWidth::of(scene, are_polygons, |i| styles[style(i)], cx)
         }
-        WireThickness::Auto => Ok(AutoWidth::WIDEST),
+        WireThickness::Auto => Ok(AutoWidth::opaque(AutoWidth::FEATURE_PX)),
     }
 }
 
@@ -171,11 +179,13 @@ fn wire_styles(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<Li
         kinds[at].1[index] = true;
     }
     let mut style = |(wire, styles): (Wire, Vec<bool>)| {
-        let AutoWidth { width_px, opacity } = width(scene, &wire, &styles, cx)?;
+        let AutoWidth { width_px, fade } = width(scene, &wire, &styles, cx)?;
         Ok(LineStyle {
             width_px,
             smoothing_px: wire.smoothing,
-            color: wire_color(&wire).map(|v| v * opacity),
+            color: wire_color(&wire),
+            fade,
+            fades_by_edges: wire.thickness == WireThickness::Auto && wire.edges == WireEdges::Feature,
             hidden: wire.hidden,
             lit: wire.lit,
             contour: false,
@@ -196,6 +206,8 @@ fn topology_styles(topology: &Topology) -> Vec<LineStyle> {
             width_px: topology.thickness * share,
             smoothing_px: 0.0,
             color: color.premultiplied(),
+            fade: None,
+            fades_by_edges: false,
             hidden,
             lit: false,
             contour: false,

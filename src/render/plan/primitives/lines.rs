@@ -1,6 +1,7 @@
-//! Lines and points of the file whose material has no filled surface. They are drawn as lines of exact
-//! width in pixels, in the colour and width of their material's own wire or outline. A point is a line of
-//! no length, which shows as a dot.
+//! Lines and points of the file whose material has no filled surface. They are drawn as lines of
+//! exact width in pixels, in the colour and width of their material's wire, or else of its outline.
+//! A wire by another method than `exact` has no width in pixels, and is given a fixed one. A point
+//! is a line of no length, which shows as a dot.
 
 use std::sync::Arc;
 

@@ -63,8 +63,8 @@ fn layers() -> Vec<Field> {
         "wire.color" |d| d.wire().color, default "#000";
             "The lines' colour.";
         "wire.thickness" |d| d.wire().thickness, default "auto";
-            "exact: full width in pixels; auto: 1, and thinner or fainter where lines would cover more than about a third of \
-             the surface. Other methods: multiples of the method's own unit, at most 10; auto: 1.";
+            "exact: full width in pixels; auto: 1, thinner where lines would cover more than about a third of the surface, \
+             and fainter over its dense parts. Other methods: multiples of the method's own unit, at most 10; auto: 1.";
         "wire.smoothing" |d| d.wire_draft().smoothing, in number(0.0, 10.0);
             "exact: pixels of a ramp beyond the box filter, by default 0; fwidth and fwidth-min: width of the smoothstep in \
              multiples, by default 1.";

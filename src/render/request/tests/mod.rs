@@ -52,8 +52,7 @@ fn every_style_has_its_layers() {
         assert_eq!(spec.layers.outline.is_some(), outline, "{style}");
         assert_eq!(spec.topology.is_some(), style == "topology");
         if let Some(wire) = spec.layers.wire {
-            let thickness = if style == "technical" { WireThickness::Given(1.0) } else { WireThickness::Auto };
-            assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Exact, thickness, 0.0));
+            assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Exact, WireThickness::Auto, 0.0));
         }
     }
     assert_eq!(query(&[]).unwrap(), query(&[("style", "auto")]).unwrap());

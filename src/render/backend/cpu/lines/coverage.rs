@@ -267,27 +267,54 @@ fn composite_kernel(
     (light, depths): (&[Light], &[f32]),
     colors: &mut [[f32; 4]],
 ) {
-    let (peak, reach) = (lines.peak(), lines.tint_reach());
-    for (i, c) in colors.iter_mut().enumerate() {
-        let (cover, mask) = match (holes.covered_share(i), strokes.of(i)) {
-            (Some(cover), _) => (cover, &NO_POINTS),
-            (None, Some(coverage)) => (coverage.covered_share(peak), &coverage.mask),
-            (None, None) => continue,
-        };
-        if cover > 0.0 {
-            let under = if is_composited(c) {
-                [c[0], c[1], c[2], -c[3]]
-            } else {
-                let surface = compositor.uncovered(i, *c, mask, lines.color[3] * peak);
-                over_background(surface, compositor.background(i))
+    let (width_px, peak) = (compositor.band.size_px[0], lines.peak());
+    for (y, (row, colors)) in (compositor.band.shown[0]..).zip(colors.chunks_mut(width_px.max(1) as usize).enumerate())
+    {
+        let fades = lines.fade.as_deref().map(|fade| (fade, fade.row(y)));
+        for (x, c) in (0..).zip(colors) {
+            let i = row * width_px as usize + x as usize;
+            let line_color = || match &fades {
+                Some((fade, row)) => {
+                    let share = fade.at(row, x);
+                    lines.color.map(|v| v * share)
+                }
+                None => lines.color,
             };
-            let mut color = light.get(i).map_or(lines.color, |light| light.on_premultiplied(lines.color));
-            if let (Some(&depth), Some(peel)) = (depths.get(i), compositor.peel) {
-                color = peel.tints.tinted(i, (depth, reach), color);
-            }
-            *c = std::array::from_fn(|k| cover * color[k] + under[k] * (1.0 - cover * color[3]));
-            c[3] = -c[3];
+            composite_pixel(compositor, (lines, peak), (strokes, holes), (light, depths), i, line_color, c);
         }
+    }
+}
+
+/// Composites the lines of a pass over the colour of a pixel, by its index among the shown ones.
+#[inline(always)]
+fn composite_pixel(
+    compositor: &LineCompositor<'_>,
+    (lines, peak): (&LinePass, f32),
+    (strokes, holes): (&BandStrokes, &Holes),
+    (light, depths): (&[Light], &[f32]),
+    i: usize,
+    line_color: impl Fn() -> [f32; 4],
+    c: &mut [f32; 4],
+) {
+    let (cover, mask) = match (holes.covered_share(i), strokes.of(i)) {
+        (Some(cover), _) => (cover, &NO_POINTS),
+        (None, Some(coverage)) => (coverage.covered_share(peak), &coverage.mask),
+        (None, None) => return,
+    };
+    if cover > 0.0 {
+        let line_color = line_color();
+        let under = if is_composited(c) {
+            [c[0], c[1], c[2], -c[3]]
+        } else {
+            let surface = compositor.uncovered(i, *c, mask, line_color[3] * peak);
+            over_background(surface, compositor.background(i))
+        };
+        let mut color = light.get(i).map_or(line_color, |light| light.on_premultiplied(line_color));
+        if let (Some(&depth), Some(peel)) = (depths.get(i), compositor.peel) {
+            color = peel.tints.tinted(i, (depth, lines.tint_reach()), color);
+        }
+        *c = std::array::from_fn(|k| cover * color[k] + under[k] * (1.0 - cover * color[3]));
+        c[3] = -c[3];
     }
 }
 

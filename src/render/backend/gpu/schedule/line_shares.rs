@@ -6,7 +6,7 @@ use super::CHUNK;
 use super::sizes::{DeviceTraits, has_visibility};
 use super::step::Step;
 use crate::backend::DrawError;
-use crate::backend::gpu::params::{Batch, faces_code, line_flags};
+use crate::backend::gpu::params::{Batch, faces_code, fade_places, line_flags};
 use crate::backend::gpu::pass_mask::Pass;
 use crate::backend::gpu::pipelines::Kernel;
 use crate::backend::gpu::schedule::Schedule;
@@ -143,7 +143,8 @@ impl Schedule {
         pixels: Batch,
         edge_starts: &[u32],
     ) -> Result<(), DrawError> {
-        for (pass, (lines, &edges_first)) in (0..).zip(plan.lines.iter().zip(edge_starts)) {
+        let fades = fade_places(&plan.lines);
+        for (pass, ((lines, &edges_first), line_fade)) in (0..).zip(plan.lines.iter().zip(edge_starts).zip(fades)) {
             let shares = LineShares::new(plan, lines, device);
             let is_lit = lines.lit && plan.lights_lines();
             let first = if pass == 0 { line_flags::FIRST_PASS } else { 0 };
@@ -161,6 +162,7 @@ impl Schedule {
                 farther_samples: lines.farther_samples_max(plan.samples),
                 line_flags: line_flags::of(plan, lines, has_visibility(plan)) | first,
                 line_pass: pass,
+                line_fade,
                 ..pixels
             };
             let has_holes = plan.has_holes_under(lines);

@@ -1,21 +1,25 @@
 //! The automatic width of wires (lines along the mesh's edges) whose thickness a request leaves open. It
-//! is 1 pixel. Where the picture's edges lie so close that such lines would cover more than 35 % of the
-//! surface, they become thinner, down to 0.8 pixels, and then fainter, so that the surface can be seen.
+//! is 1 pixel. If the picture's edges lie so close that such lines would cover more than 35 % of the
+//! surface, all lines become thinner, down to 0.8 pixels. Wherever lines of that width cover more than
+//! 35 % of the surface around a place, they are [fainter](super::fade) there, so that the surface can be seen.
 
+mod features;
 mod open_edges;
 
-pub use open_edges::open_edges;
+pub use open_edges::{OpenEdges, open_edges};
 
-use super::picked_faces::PickedFace;
+use std::sync::Arc;
+
+use super::fade::{Density, LineFade};
 use crate::mesh::Mesh;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
 use crate::plan::{PX, PlanError, Projection, Projector};
 use crate::scene::Scene;
 
-/// Share of the faces that lines cover at most, on average over their area on screen.
+/// Share of the faces that lines cover at most: on average over their area on screen, and around each place.
 const COVERED_MAX: f64 = 0.35;
 
-/// The widest and the thinnest line, pixels. Where the thinnest ones cover too much, they get fainter
+/// The thinnest and the widest line, pixels. Where the thinnest ones cover too much, they get fainter
 /// instead: far below a pixel, width and opacity look the same, and these are drawn sooner.
 const WIDTHS_PX: [f64; 2] = [0.8, 1.0];
 
@@ -32,17 +36,19 @@ const CLASSES: usize = ((EXPONENTS[1] - EXPONENTS[0]) << MANTISSA_BITS) as usize
 const STEPS: f64 = 256.0;
 
 /// Width and opacity of lines.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct AutoWidth {
     /// Full width, pixels.
     pub width_px: f32,
-    /// Multiplies the colour's own opacity.
-    pub opacity: f32,
+    /// Multiplies the colour's own opacity, from place to place; None: by 1.
+    pub fade: Option<Arc<LineFade>>,
 }
 
 impl AutoWidth {
-    /// Lines with room around them.
-    pub const WIDEST: Self = Self { width_px: 1.0, opacity: 1.0 };
+    /// Opaque lines of a width.
+    pub fn opaque(width_px: f32) -> Self {
+        Self { width_px, fade: None }
+    }
 
     /// The lines along all edges of a scene, or those of its polygons, around the triangles that `has_lines`
     /// names.
@@ -58,29 +64,24 @@ impl AutoWidth {
         let picked = cx.picked_faces(scene.mesh)?;
         let view = View::new(scene, are_polygons);
         let mut sizes = FaceSizes([0; CLASSES]);
+        let mut density = Density::new(scene.size_px());
         for faces in picked.chunks(CHECK_EVERY) {
             cx.deadline.check()?;
-            sizes.add(&view, faces.iter().filter(|picked| has_lines(picked.face as usize)));
+            for picked in faces.iter().filter(|picked| has_lines(picked.face as usize)) {
+                if let Some(face) = view.face(picked.face as usize) {
+                    if view.shows_middle(&face.corners) {
+                        sizes.add(&face, picked.weight);
+                    }
+                    let corners = face.corners.map(|corner| view.in_picture(corner));
+                    let covered = WIDTHS_PX.map(|width_px| covered_share(width_px, face.diameter));
+                    density.add_face(corners, face.area, f64::from(picked.weight), covered);
+                }
+            }
         }
-        Ok(Self::around(&sizes))
-    }
-
-    /// The lines around faces of these sizes.
-    fn around(faces: &FaceSizes) -> Self {
-        let [mut thin, mut wide] = WIDTHS_PX;
-        let step = |v: f64| ((v * STEPS).round() / STEPS) as f32;
-        if faces.covered(wide) <= COVERED_MAX {
-            return Self::WIDEST;
-        }
-        let least = faces.covered(thin);
-        if least >= COVERED_MAX {
-            return Self { width_px: thin as f32, opacity: step(COVERED_MAX / least) };
-        }
-        for _ in 0..12 {
-            let middle = 0.5 * (thin + wide);
-            if faces.covered(middle) > COVERED_MAX { wide = middle } else { thin = middle }
-        }
-        Self { width_px: step(thin), opacity: 1.0 }
+        let width = sizes.width();
+        let [thin, wide] = WIDTHS_PX;
+        let fade = density.fade(COVERED_MAX, (width - thin) / (wide - thin));
+        Ok(Self { width_px: width as f32, fade: fade.map(Arc::new) })
     }
 }
 
@@ -89,26 +90,43 @@ impl AutoWidth {
 struct FaceSizes([u64; CLASSES]);
 
 impl FaceSizes {
-    /// Adds faces but those with a corner behind the near plane or the centre outside the picture.
-    fn add<'a>(&mut self, view: &View<'_>, faces: impl Iterator<Item = &'a PickedFace>) {
-        for picked in faces {
-            if let Some([area, diameter]) = view.size_of(picked.face as usize) {
-                let class = &mut self.0[class_of(diameter)];
-                *class = class.saturating_add((area * f64::from(picked.weight) * 256.0).round() as u64);
-            }
+    /// Adds a face that stands for `weight` faces.
+    fn add(&mut self, face: &FaceOnScreen, weight: f32) {
+        let class = &mut self.0[class_of(face.diameter)];
+        *class = class.saturating_add((face.area * f64::from(weight) * 256.0).round() as u64);
+    }
+
+    /// The width of lines around these faces, pixels.
+    fn width(&self) -> f64 {
+        let [mut thin, mut wide] = WIDTHS_PX;
+        if self.covered(wide) <= COVERED_MAX {
+            return wide;
         }
+        if self.covered(thin) >= COVERED_MAX {
+            return thin;
+        }
+        for _ in 0..12 {
+            let middle = 0.5 * (thin + wide);
+            if self.covered(middle) > COVERED_MAX { wide = middle } else { thin = middle }
+        }
+        (thin * STEPS).round() / STEPS
     }
 
     /// The share of the faces that lines of a width cover, 0 to 1; 0 if there are none.
     fn covered(&self, width_px: f64) -> f64 {
         let (mut covered, mut all) = (0.0, 0.0);
         for (class, &area) in self.0.iter().enumerate() {
-            let free = (1.0 - width_px / diameter_of(class)).max(0.0);
             all += area as f64;
-            covered += area as f64 * (1.0 - free * free);
+            covered += area as f64 * covered_share(width_px, diameter_of(class));
         }
         if all > 0.0 { covered / all } else { 0.0 }
     }
+}
+
+/// The share of a face that lines of this width cover, given the diameter of its inscribed circle, 0 to 1.
+fn covered_share(width_px: f64, diameter: f64) -> f64 {
+    let free = (1.0 - width_px / diameter).max(0.0);
+    1.0 - free * free
 }
 
 /// The class of a diameter, by the leading bits of its binary form.
@@ -121,6 +139,15 @@ fn class_of(diameter: f64) -> usize {
 fn diameter_of(class: usize) -> f64 {
     let leading = class as i64 + ((1023 + EXPONENTS[0]) << MANTISSA_BITS);
     f64::from_bits(((leading as u64) << (52 - MANTISSA_BITS)) | 1 << (51 - MANTISSA_BITS))
+}
+
+/// A face as it is seen, pixels.
+struct FaceOnScreen {
+    /// From the middle of the picture.
+    corners: [[f64; 2]; 3],
+    area: f64,
+    /// Of its inscribed circle.
+    diameter: f64,
 }
 
 /// A mesh as it is seen.
@@ -139,14 +166,10 @@ impl<'a> View<'a> {
         Self { mesh: scene.mesh, projector, half_px, are_polygons }
     }
 
-    /// The area of a face on screen and the diameter of its inscribed circle, pixels.
-    fn size_of(&self, face: usize) -> Option<[f64; 2]> {
+    /// A face on screen; None with a corner behind the near plane, or without an area.
+    fn face(&self, face: usize) -> Option<FaceOnScreen> {
         let [a, b, c] = self.mesh.triangles[face].map(|v| self.place_of(v));
         let corners = [a?, b?, c?];
-        let is_inside = |k: usize| (corners.iter().map(|corner| corner[k]).sum::<f64>() / 3.0).abs() <= self.half_px[k];
-        if !is_inside(0) || !is_inside(1) {
-            return None;
-        }
         let ways = [0, 1, 2].map(|k| [0, 1].map(|axis| corners[(k + 1) % 3][axis] - corners[k][axis]));
         // A face may be far larger than the picture.
         let picture = 4.0 * self.half_px[0] * self.half_px[1];
@@ -154,7 +177,17 @@ impl<'a> View<'a> {
         let mask = if self.are_polygons { self.mesh.edge_masks.get(face).copied().unwrap_or(7) } else { 7 };
         let drawn = (0..3).filter(|k| mask >> k & 1 == 1);
         let length: f64 = drawn.map(|k: usize| (ways[k][0] * ways[k][0] + ways[k][1] * ways[k][1]).sqrt()).sum();
-        (area > 0.0).then_some([area, 4.0 * area / length])
+        (area > 0.0).then_some(FaceOnScreen { corners, area, diameter: 4.0 * area / length })
+    }
+
+    /// True if the middle of a face lies in the picture.
+    fn shows_middle(&self, corners: &[[f64; 2]; 3]) -> bool {
+        (0..2).all(|k| (corners.iter().map(|corner| corner[k]).sum::<f64>() / 3.0).abs() <= self.half_px[k])
+    }
+
+    /// A place given from the picture's middle, from its upper left corner.
+    fn in_picture(&self, place: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|k| place[k] + self.half_px[k])
     }
 
     /// The length of an edge on screen, pixels, if its middle is in the picture.

@@ -14,11 +14,17 @@ fn lines(n: usize, are_polygons: bool) -> AutoWidth {
         format!("f {} {} {} {}\n", a, a + 1, a + n + 2, a + n + 1)
     };
     let obj: String = (0..(n + 1) * (n + 1)).map(at).chain((0..n * n).map(face)).collect();
+    width_of(obj, [120; 2], are_polygons)
+}
+
+/// The lines along the edges of a model that fills a picture of this size.
+fn width_of(obj: String, size_px: [u32; 2], are_polygons: bool) -> AutoWidth {
     let limits = Limits::default();
     let mut budget = Budget::new(&limits);
     let bundle = Bundle::of_one(obj.into_bytes());
     let mesh = import::import(&bundle, None, &limits, &mut budget, &Deadline::default()).unwrap().0;
-    let keys = [("size", "120"), ("view", "front"), ("camera.projection", "orthographic"), ("camera.margin", "0")];
+    let size = format!("{}x{}", size_px[0], size_px[1]);
+    let keys = [("size", &size[..]), ("view", "front"), ("camera.projection", "orthographic"), ("camera.margin", "0")];
     let keys = keys.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Cpu };
     let spec = request::read(None, &keys, &rules).unwrap();
@@ -30,12 +36,17 @@ fn lines(n: usize, are_polygons: bool) -> AutoWidth {
 #[test]
 fn lines_cover_about_a_third_at_most() {
     // Squares of 12 px: 1 px covers about a sixth.
-    assert_eq!(lines(10, true), AutoWidth::WIDEST);
+    assert_eq!(lines(10, true), AutoWidth::opaque(1.0));
     let mut last = 1.0;
     let mut kinds = [0; 2];
     for n in [20, 22, 24, 26, 28, 30, 60, 120, 300] {
         let side_px = 120.0 / n as f64;
-        let AutoWidth { width_px, opacity } = lines(n, true);
+        let AutoWidth { width_px, fade } = lines(n, true);
+        let opacities = fade.map_or(vec![1.0], |fade| fade.opacities.clone());
+        let (least, most) = opacities.iter().fold((1.0_f32, 0.0_f32), |(a, b), &v| (a.min(v), b.max(v)));
+        // Of 180,000 triangles some are looked at.
+        assert!(most - least < 0.05, "{n}: {opacities:?}");
+        let opacity = 0.5 * (least + most);
         let free = (1.0 - f64::from(width_px) / side_px).max(0.0);
         let covered = (1.0 - free * free) * f64::from(opacity);
         assert!(covered < 0.36, "{n}: {covered}");
@@ -49,4 +60,23 @@ fn lines_cover_about_a_third_at_most() {
     assert!(kinds[0] > 0 && kinds[1] > 3, "{kinds:?}");
     // Diagonals take room, too.
     assert!(lines(22, false).width_px < lines(22, true).width_px);
+}
+
+#[test]
+fn lines_are_faint_over_the_dense_part_of_a_mesh_alone() {
+    // A square that is one polygon beside one of 60 x 60, each 60 px wide.
+    let at = |i: usize| format!("v {} {} 0\n", i % 61, i / 61);
+    let face = |i: usize| {
+        let a = i / 60 * 61 + i % 60 + 1;
+        format!("f {} {} {} {}\n", a, a + 1, a + 62, a + 61)
+    };
+    let large = "v -60 0 0\nv 0 0 0\nv 0 60 0\nv -60 60 0\nf -4 -3 -2 -1\n".to_owned();
+    let obj: String = (0..61 * 61).map(at).chain((0..3600).map(face)).chain([large]).collect();
+    let AutoWidth { width_px, fade } = width_of(obj, [120, 60], true);
+    let fade = fade.unwrap();
+    let row = fade.row(30);
+    let along: Vec<f32> = (0..120).map(|x| fade.at(&row, x)).collect();
+    assert_eq!(width_px, 0.8);
+    assert!(along[..24].iter().all(|&opacity| opacity == 1.0), "{along:?}");
+    assert!(along[96..].iter().all(|&opacity| opacity < 0.4), "{along:?}");
 }
