@@ -1,6 +1,6 @@
-// The clipping of triangles that reach behind the eye or far outside the picture (stage visibility), one triangle
-// per thread. What is left of a triangle is a fan of up to six triangles. They are appended to the work list, from
-// which visibility_tile.wgsl draws them afterwards. Twin of src/render/backend/cpu/geometry/clip.rs.
+// The clipping of triangles that reach behind the near plane or far outside the picture (stage visibility), one
+// triangle per thread. What is left of a triangle is a fan of up to six triangles. This kernel appends them to the
+// work list, and visibility_tile.wgsl draws them from there. Twin of src/render/backend/cpu/geometry/clip.rs.
 //
 // Uses: common.wgsl (homogeneous, WORKGROUP), one_job.wgsl (batch), geometry/corners.wgsl (Corners,
 // is_outside, screen_triangle, triangles), geometry/culling.wgsl (passes_culling),

@@ -1,9 +1,10 @@
 // Stage visibility, per triangle: finds the samples that the triangle covers and its depth at each. The visibility
 // buffer keeps the nearest triangle for each sample. Twin of src/render/backend/cpu/geometry/visibility.rs.
 //
-// A thread draws a small triangle itself; larger ones go to the work list for visibility_tile.wgsl. Built with
-// other files, the kernel draws triangles into a layer of depth peeling (peeling/emit_layer.wgsl) or offers them to
-// mixed pixels, which are drawn again from many points (mixed/lists.wgsl, mixed/points.wgsl).
+// A thread draws a small triangle itself; larger ones go to the work list for visibility_tile.wgsl. Triangles that
+// have to be clipped are left to clip.wgsl. Built with other files, the kernel draws triangles into a layer of
+// depth peeling (peeling/emit_layer.wgsl) or offers them to mixed pixels, which are drawn again from many points
+// (mixed/lists.wgsl, mixed/points.wgsl).
 //
 // Uses: common.wgsl (WORKGROUP), one_job.wgsl or gang.wgsl (batch, begin_job),
 // geometry/corners.wgsl (is_outside, screen_triangle), geometry/culling.wgsl (passes_culling),

@@ -1,6 +1,7 @@
-// Stage visibility for a dispatch of few triangles: each triangle has one or more workgroups of its own, which draw
-// it in tiles of 64 x 64 pixels, whatever its size. So no list of large triangles is needed. No twin: on the CPU,
-// threads do not share a triangle's pixels like this.
+// Stage visibility for a dispatch of few triangles, none of which has to be clipped: each triangle has one or more
+// workgroups of its own, which draw it in tiles of 64 x 64 pixels, whatever its size. If one thread drew each
+// small triangle, as in visibility.wgsl, so few triangles would leave most of a GPU idle. No work list of large
+// triangles is needed. No twin: on the CPU, threads do not share a triangle's pixels like this.
 //
 // Uses: common.wgsl (WORKGROUP), one_job.wgsl or gang.wgsl (batch, begin_job),
 // geometry/corners.wgsl (is_outside, screen_triangle), geometry/culling.wgsl (passes_culling),

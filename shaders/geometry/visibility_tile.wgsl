@@ -1,6 +1,7 @@
-// Stage visibility, per triangle of the work list (triangles that are too large for one thread, and pieces that clipping has
-// left): a large triangle is drawn by one workgroup, in tiles of 64 x 64 pixels; the tiles of a huge one (128 px or more
-// on a side) are divided among all workgroups. No twin: on the CPU, threads do not divide a triangle's pixels like this.
+// Stage visibility, per triangle of the work list (triangles that are too large for one thread, and pieces that
+// clipping has left). One workgroup draws a large triangle, in tiles of 64 x 64 pixels. All workgroups together
+// draw a huge one, whose box in the picture is more than 128 px wide or high: its tiles are divided among them. No
+// twin: on the CPU, threads do not divide a triangle's pixels like this.
 //
 // Uses: common.wgsl (ITEM_VECTORS, JOBS_MAX, WORKGROUP), one_job.wgsl or gang.wgsl (batch,
 // begin_job, frame, job), geometry/tile.wgsl (draw_tiles), geometry/triangle.wgsl (Setup).

@@ -13,7 +13,7 @@ struct Counts {
 struct Work {
     // Of each job of a gang.
     counts: array<Counts, JOBS_MAX>,
-    // Three words of four an item; a job's large ones from the front, huge ones from the back.
+    // Three vectors of four words per item; a job's large ones from the front, huge ones from the back.
     items: array<vec4<u32>>,
 };
 

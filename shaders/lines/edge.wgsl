@@ -1,14 +1,15 @@
-// Stage lines, per edge: draws the edge as a line of exact width. The visible (or hidden) parts of the edge are
-// found, and for each part a stroke, which is all that lies within half the line's width of it, is added to the
-// pixels that it touches. coverage.wgsl makes colours of the strokes. Twin of src/render/backend/cpu/lines/edge.rs.
+// Stage lines, per edge: draws the edge as a line of exact width. The kernel finds the visible (or hidden) parts
+// of the edge. To each pixel that a part touches it adds a stroke: all that lies within half the line's width of
+// the part. coverage.wgsl makes colours of the strokes. Twin of src/render/backend/cpu/lines/edge.rs.
 //
 // An edge is cut along its length into windows, and the pixel rows of a window into slices. Such a slice is called
 // a share here. A workgroup has some edges. Each of its threads looks at one share, to find out whether there is
-// something to draw. Those shares are drawn one after the other, each by all threads together.
+// something to draw. Shares with something to draw are then drawn one after the other, each by all threads
+// together.
 //
-// Where dispatches must be short, a workgroup pauses after a number of units of work, and the next dispatch
-// continues there. A unit is a look at shares (one by each thread), the search for what hides one, or the drawing
-// of a part of it.
+// Dispatches must be short on a software device, which cuts long loops off, and for wide lines, which take long.
+// There a workgroup pauses after a number of units of work, and the next dispatch continues where it has paused. A
+// unit is a look at shares (one by each thread), the search for what hides one, or the drawing of a part of it.
 //
 // Uses: common.wgsl (has, HOLED, HOLES, LIT_PASS, recip, RIM_PASS, rn, SHOWN_HIDDEN, SHOWN_VISIBLE,
 // TINTED_PASS, Vertex), one_job.wgsl (batch, frame), lines/contour.wgsl (is_drawn, is_silhouette,

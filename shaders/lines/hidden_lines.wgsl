@@ -2,8 +2,8 @@
 // Twin of src/render/backend/cpu/lines/hidden_lines.rs; edge.wgsl declares the buffers.
 //
 // All threads of a workgroup together find the triangles along the edge and the interval that each of them hides.
-// The CPU sorts these intervals. Here they stay unsorted, and all are looked through again for each visible part,
-// from one end of the edge to the other.
+// The CPU sorts these intervals. Here they stay unsorted. The search for visible parts goes from one end of the
+// edge to the other, and looks through all intervals again for each part.
 //
 // Uses: common.wgsl (CLIPPED, has, OUTSIDE, recip, rn, rn3, sample_count, Vertex), one_job.wgsl
 // (batch, frame), geometry/planes.wgsl (is_moderate), geometry/steepness.wgsl (is_far,

@@ -1,6 +1,6 @@
 // The stroke of a piece of an edge in one pixel (stage lines): all that lies within half the line's width of the
-// piece. Found are the area that it covers in the pixel, and which of the pixel's 256 coverage points. Both are
-// added to what other strokes cover there. Twin of src/render/backend/cpu/lines/stroke.rs.
+// piece. The functions here find the area that it covers in the pixel, and which of the pixel's 256 coverage
+// points. They add both to what other strokes cover there. Twin of src/render/backend/cpu/lines/stroke.rs.
 //
 // Uses: common.wgsl (rn, round_to_i32), one_job.wgsl (batch, frame), geometry/steepness.wgsl
 // (MIN_POSITIVE), lines/edge.wgsl (strokes), lines/lattice.wgsl (lattice_points, product, UNIT,

@@ -3,8 +3,9 @@
 // colours of these triangles are added up, each weighted by its share of the points. Twin of
 // src/render/backend/cpu/mixed/color.rs.
 //
-// Used for pictures in linear light, and if the buffer is too small for a picture's lists of triangles
-// (lists.wgsl). Otherwise mixed_parts.wgsl, mixed_shade.wgsl and mixed_sum.wgsl do this work.
+// Used where mixed pixels have no lists of triangles (lists.wgsl): for pictures in linear light, and if a picture
+// is drawn once more because the lists of the first attempt had no room. Otherwise mixed_parts.wgsl,
+// mixed_shade.wgsl and mixed_sum.wgsl do this work.
 //
 // Uses: common.wgsl (has, LINES, WORKGROUP), one_job.wgsl (batch), mixed/lattice.wgsl (FEW_STEP,
 // POINTS), mixed/place.wgsl (border_at, BORDER_WORDS, FEW, pixel_at), mixed/share_color.wgsl

@@ -1,6 +1,7 @@
 // The share of light that reaches a pixel (stage occlusion, which darkens hollows). It follows from a weighted
 // mean of the blocked light that gather.wgsl has found, over the neighbours that show the same surface. The mean
-// makes the darkness smooth. Twin of src/render/backend/cpu/occlusion/spread.rs.
+// makes the darkness smooth, and serves the pixels for which gather.wgsl computes nothing. Twin of
+// src/render/backend/cpu/occlusion/spread.rs.
 //
 // Uses: common.wgsl (rn, round_to_i32), one_job.wgsl or gang.wgsl (frame), occlusion/place.wgsl
 // (is_in_picture, NOWHERE, place_of).

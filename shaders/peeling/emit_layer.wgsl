@@ -1,6 +1,7 @@
 // The triangle that a sample keeps for a layer (stage visibility). Layers are what depth peeling finds of
 // transparent surfaces, from front to back. Of the triangles that cover the sample, the nearest one behind the
-// previous layer is kept. Twin of src/render/backend/cpu/peeling/emit_layer.rs.
+// previous layer is kept. It must lie in front of the opaque surface, unless wires show through the surface. Twin
+// of src/render/backend/cpu/peeling/emit_layer.rs.
 //
 // Uses: common.wgsl (BEHIND_SURFACE, has, sample_count), one_job.wgsl (batch), peeling/rounds.wgsl
 // (is_peeling_done), peeling/state.wgsl (PeelState), samples/samples.wgsl (sample_index),

@@ -1,5 +1,6 @@
-// A sample of the visibility buffer (stage visibility): of the triangles that are offered to it, it keeps the
-// nearest. peeling/emit_layer.wgsl takes the place of this file where layers of transparent triangles are drawn.
+// The triangle that a sample of the visibility buffer keeps (stage visibility): the nearest of those that cover
+// the sample. peeling/emit_layer.wgsl takes the place of this file where layers of transparent triangles are
+// drawn.
 //
 // Uses: one_job.wgsl or gang.wgsl (batch), samples/samples.wgsl (sample_index),
 // samples/samples32.wgsl or samples/samples64.wgsl (keep_nearest).

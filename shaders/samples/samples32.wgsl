@@ -1,6 +1,7 @@
 // The nearest triangle of a sample, kept without 64-bit atomics (stage visibility). This takes two phases, each
-// over all triangles: first the nearest depth is found, then, where a triangle computes just that depth again, the
-// lowest id. The memory is the same as with 64 bits: low word, high word.
+// over all triangles. The first finds the nearest depth. The second computes all depths again, and finds the
+// lowest id of the triangles that have the nearest one. The memory is the same as with 64 bits: low word, high
+// word.
 //
 // Uses: nothing.
 

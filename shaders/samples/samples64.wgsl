@@ -1,5 +1,5 @@
-// The nearest triangle of a sample, kept with 64-bit atomics (stage visibility): one maximum takes depth and id
-// together, and of equal depths the lowest id.
+// The nearest triangle of a sample, kept with 64-bit atomics (stage visibility). One word holds the depth and,
+// below it, the complement of the id. Its maximum is the nearest depth and, of equal depths, the lowest id.
 //
 // Uses: nothing.
 

@@ -1,7 +1,7 @@
 // Stages shade and resolve in one, per pixel: the final bytes straight from the visible triangles, without the
-// colours that shade.wgsl writes and resolve.wgsl reads. Used where no lines are drawn, no transparent layers are
-// peeled, no hollows are darkened, and no pixels are drawn again from more points (stage mixed). No twin: the CPU
-// has a path for flat faces instead.
+// colours that shade.wgsl writes and resolve.wgsl reads. Not for pictures in linear light, which have no bytes.
+// Used where no lines are drawn, no transparent layers are peeled, no hollows are darkened, and no pixels are
+// drawn again from more points (stage mixed). No twin: the CPU has a path for flat faces instead.
 //
 // Uses: common.wgsl (first_visibility_sample, rn, rn4, sample_count, WORKGROUP), one_job.wgsl or
 // gang.wgsl (batch, begin_job, frame), encode.wgsl (encode, rgba), over.wgsl (background_at,

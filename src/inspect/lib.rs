@@ -1,7 +1,9 @@
-//! Statements about meshes: the [`report`] on one, its [`check`] by rules, and the [`diff`] of two.
+//! The crate that judges and compares meshes: the [`report`] on one, its [`check`] by rules, and
+//! the [`diff`] of two.
 //!
-//! [`read`] reads the meshes that are judged or compared, [`drawing`] makes pictures of what was found. [`geometry`] has
-//! what they compute: distances, thickness, intersections, charts of texture coordinates.
+//! [`read`] reads the meshes, [`drawing`] makes pictures of what was found. [`geometry`] has what
+//! reports, rules and differences compute: distances, thickness, intersections, charts of texture
+//! coordinates.
 
 pub mod check;
 pub mod diff;

@@ -1,5 +1,5 @@
-//! Errors of the library. Each says which party can mend it: the author of the mesh, the author of the request, the
-//! caller, or the machine.
+//! Errors of the library. Each says which party can mend it ([`Fault`]): the author of the mesh,
+//! the author of the request, the caller, who stopped the work, or the machine or this crate.
 
 use meshsnap_render::backend::DrawError;
 use meshsnap_render::encode::EncodeError;

@@ -1,4 +1,5 @@
-//! Reading a mesh: one file, or several that belong together.
+//! The [`Mesh`], and its reader: it reads one file, or several that belong together, such as a mesh
+//! and its textures, from memory.
 
 use std::sync::Arc;
 

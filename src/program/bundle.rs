@@ -1,6 +1,7 @@
-//! The reading of the files that a command line names as one bundle: a mesh and the files that it refers to, such as
-//! its textures. A file that is not named is not read, so files that a mesh refers to must be named too. Also says
-//! which of the named files the mesh does not use.
+//! The reading of the files that a command line names as one bundle: a mesh and the files that it
+//! refers to, such as its textures. No other file is read here; `siblings` finds those that a mesh
+//! refers to and that the command does not name. Also says which of the named files the mesh does
+//! not use.
 
 use std::path::{Component, Path, PathBuf};
 

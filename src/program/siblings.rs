@@ -1,5 +1,6 @@
-//! The files that a mesh refers to, that lie beside it, and that the command does not name, such as its textures.
-//! They are found here; where the command allows it, they are read, and otherwise a sentence advises the user to name
+//! The search for the files that a mesh refers to, that lie beside it, and that the command does
+//! not name, such as its textures. Where the command allows it (by `--siblings`, or for meshes
+//! found in a folder that it names), they are read. Otherwise a sentence advises the user to name
 //! them.
 
 use std::collections::BTreeSet;

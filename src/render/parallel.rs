@@ -1,8 +1,9 @@
 //! Parallel work on the items of a list, such as pieces of a file or of a mesh.
 //!
-//! It is done by the thread pool that the caller is in, or else by rayon's own, which has a thread for
-//! each core. A single piece is done by the calling thread. No result depends on the number of threads.
-//! `beside` alone starts threads of its own, which work while the calling thread does something else.
+//! The thread pool that the caller is in does the work, or else rayon's own, which has a thread for
+//! each core. The calling thread does a single piece. No result depends on the number of threads.
+//! `beside` alone starts threads of its own, which work while the calling thread does something
+//! else.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::thread;

@@ -1,11 +1,14 @@
-//! The whole program in one function: bytes -> Mesh -> Scene -> DrawPlan -> back-end -> Image ->
-//! encoded bytes.
+//! The pipeline, which is the whole program in one function: bytes -> Mesh -> Scene -> DrawPlan ->
+//! back-end -> Image -> encoded bytes.
 //!
 //! The command line and the job workers call [`render`]; the workers do so for synchronous HTTP
-//! too. The library calls [`draw`], which turns a mesh that is read already into a picture.
+//! too, and call [`render_model`] for a stored mesh. The library calls [`draw`], which turns a mesh
+//! that is read already into a picture.
 //!
-//! Invariant: nothing from here down reads a file or the environment, or knows an async runtime. A
-//! clock is read to time the stages of drawing, and nothing depends on it.
+//! Invariant: nothing from here down knows an async runtime, or reads or writes a file or the
+//! environment, except the file of a GPU's compiled pipelines. Clocks are read to time the stages
+//! of drawing, to choose the back-end while the GPU is busy, and to pause a GPU that was lost
+//! several times. Nothing else depends on them.
 
 mod faces;
 

@@ -1,10 +1,11 @@
 //! The daemon: [`http`] in front of [`jobs`] (the queue, the workers and their results) and [`store`] (meshes that stay).
 //!
-//! [`durable`] is the data folder, where both outlive the process. [`memory`] is what all of them share. [`residents`] and
-//! [`pictures`] remember what was read and drawn, and [`metrics`] what happened. [`keys`] says who may do what, [`rates`]
-//! how much, and [`signature`] lets addresses be used without a key. [`warm_up`] makes the first picture come sooner,
-//! [`priority`] lets answers go before pictures, [`webhooks`] tell receivers of the ends of jobs. `config` has the
-//! settings, `telemetry` the log and traces.
+//! [`durable`] is the data folder, where both outlive the process. [`memory`] is the budget that
+//! all of them share. [`residents`] and [`pictures`] remember what was read and drawn, and
+//! [`metrics`] what happened. [`keys`] says who may do what, [`rates`] how much, and [`signature`]
+//! lets addresses be used without a key. [`warm_up`] makes the first picture come sooner,
+//! [`priority`] lets answers go before pictures, [`webhooks`] tell receivers of the ends of jobs.
+//! `config` has the settings, `telemetry` the log and traces.
 //!
 //! Architecture invariant: [`http`] alone knows the requests and answers of clients.
 

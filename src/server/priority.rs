@@ -1,5 +1,6 @@
-//! The priority of the threads that draw. On Linux it is lower than that of the threads that answer requests. Where all
-//! cores are busy, an answer about health would otherwise wait behind pictures, several times on its way.
+//! The priority of the threads that draw. On Linux it is lower than that of the threads that answer
+//! requests. Otherwise, where all cores are busy, even an answer about health would wait for a core
+//! behind pictures, each time that its thread wakes.
 
 /// Steps by which it is lower: threads that answer get about three times as much of a busy core.
 #[cfg(target_os = "linux")]

@@ -1,5 +1,5 @@
-//! Rate limits of each client (an API key, or an address where there are no keys): how many requests per second, how many
-//! at once, and how many uploads and jobs per day.
+//! Rate limits of each client (an API key, or an address where there are no keys): how many
+//! requests per second, how many in a burst, and how many uploads and jobs (POST and PUT) per day.
 
 use std::num::NonZeroU32;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,17 +1,18 @@
-//! An asset browser: many clients look at stored meshes, some far more often than others (Zipf), under caps
-//! that hold a part of them. Prints rates, hits and times, and compares every picture with the one that was
-//! drawn first. The clients share the cores with the server. That the caps are kept is the server's own
-//! account; the process's memory is printed beside it.
+//! The server under an asset browser: many clients look at stored meshes, some far more often than
+//! others (Zipf), under caps that hold a part of them. Prints rates, hits and times. Unless the
+//! back-end is `auto`, compares every picture with the one that was drawn first. The clients share
+//! the cores with the server. Whether the caps are kept is read from the server's own figures
+//! (`/v1/capabilities`); the process's memory is printed beside them.
 //!
 //!     cargo bench --bench browse                              # 200 meshes, 64 clients, 60 s, a quarter kept
 //!     cargo bench --bench browse -- --seconds 10 --style wire --backend gpu
 //!     cargo bench --bench browse -- --turning --mesh bunny.obj --seconds 5
 //!     cargo bench --bench browse -- --turning --mesh bunny.obj --style auto,flat,wire --clients 1
 //!
-//! With `--turning` each request has a camera of its own, so that each picture is drawn; the PNG encoder
-//! alone, on all cores, is measured in turns with that. Up to four styles take turns with the
-//! cameras; the encoder has a picture of the first. Ends with a failure if an answer or a picture is
-//! wrong, or if a cap is not kept.
+//! With `--turning` each request has a camera of its own, so that each picture is drawn, and none
+//! is compared. In turns with that, the PNG encoder alone is measured on all cores. `--style` takes
+//! up to four styles, which the requests share; the encoder has a picture of the first. Ends with a
+//! failure if an answer or a picture is wrong, or if a cap is not kept.
 
 // A tool for developers: giving up loudly is fine.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]

@@ -1,5 +1,5 @@
-//! Pictures that are in memory: requests a second of the server over those of a bare axum handler that
-//! answers with the same bytes, in turns.
+//! The server with pictures that are in memory: its requests per second over those of a bare axum
+//! handler that answers with the same bytes. The two are measured in turns.
 //!
 //!     cargo bench --bench cached                              # api/examples/knot.obj, 256 px, 16 connections
 //!     cargo bench --bench cached -- --mesh bunny.obj --query 'style=wire&size=512' --rounds 20

@@ -1,12 +1,14 @@
 //! Latency of jobs beside a decoder that crashes, against the same beside one that does its work.
 //!
-//!     cargo bench --profile dev --bench crashes                  # 10 rounds of 2 s each
+//!     cargo bench --profile dev --bench crashes                  # 10 rounds of two halves, 2 s each
 //!     cargo bench --profile dev --bench crashes -- --rounds 30
 //!
-//! Crashes are asked for by a mark in the file, which builds with debug assertions alone understand: hence the profile.
-//! Two connections post a cube without a pause. A third posts an FBX file every 25 ms: in one half of a round a good one,
-//! in the other one that makes the process which reads it abort. The halves take turns, so that the machine's other load
-//! meets both. Ends with a failure if p99 beside crashes is more than 1.2 times the other.
+//! A mark in the file asks for the crash. Only builds with debug assertions understand it: hence
+//! the profile. Two connections post a cube without a pause. A third posts an FBX file, with pauses
+//! of 25 ms: in one half of a round a good one, in the other half one that makes the decoding
+//! process abort. The halves take turns, so that the machine's other load meets both. Ends with a
+//! failure if p99 beside crashes is more than 1.2 times the other, or if fewer than 100 files of
+//! either kind were posted.
 
 // A tool for developers: giving up loudly is fine.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]

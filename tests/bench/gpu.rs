@@ -1,5 +1,5 @@
-//! The GPU: time to its first picture, time of each stage by its own clock, and pictures a second without
-//! encoding, on any number of workers.
+//! The GPU: time to its first picture, time of each stage by its own clock, and pictures per second
+//! without encoding, on any number of workers.
 //!
 //!     cargo bench --bench gpu                              # bumpy tori of 70 k and 1 M triangles, 512 px
 //!     cargo bench --bench gpu -- --mesh bunny.obj --look flat --size 256 --workers 16 --rounds 200

@@ -4,10 +4,10 @@
 //!     cargo bench --bench intersections -- --quads 1000 --threads 8
 //!
 //! Four meshes: a bumpy torus, two of them through each other, a flat sheet along two axes, and an
-//! oblique one whose corners lie in one plane exactly, so that every sign beside it is a hard one. The last line is the
-//! verdict: whether the slowest search for intersections took less than 3 s for each million triangles. Without it, the
-//! program ends with 1. Between them is the time of the charts of the texture and of their overlaps, for a torus whose
-//! texture lies twice on itself.
+//! oblique one whose corners lie in one plane exactly, so that every sign beside it is a hard one.
+//! After their lines comes the time of the charts of a texture and of their overlaps, for a torus
+//! whose texture lies twice on itself. The last line is the verdict: whether the slowest search for
+//! intersections took less than 3 s for each million triangles. If not, the program ends with 1.
 
 // A tool for developers: giving up loudly is fine.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]

@@ -6,7 +6,8 @@
 //!     cargo bench --bench load -- --url 127.0.0.1:8080        # a server that runs already (no memory is sampled)
 //!
 //! Starts a server of its own unless told where one is. Ends with a failure if anything but 200 and
-//! 429 came back, or if memory grew after the first third.
+//! 429 came back, if a connection broke, or if memory grew by more than 15 % from the second third
+//! of the time to the last.
 
 // A tool for developers: giving up loudly is fine.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]

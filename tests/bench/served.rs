@@ -1,4 +1,4 @@
-//! A server that is measured, and a client.
+//! What the benchmarks of the server share: they start a server, and send it requests.
 
 // A tool for developers: giving up loudly is fine. Not every benchmark uses all of it.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, dead_code)]

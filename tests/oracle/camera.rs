@@ -1,4 +1,5 @@
-//! From positions to the screen, given as plain numbers.
+//! The oracle's camera, given as plain numbers: takes positions to pixels and depth, and cuts off
+//! what lies behind the near plane.
 
 use super::vector::V3;
 

@@ -1,5 +1,6 @@
-//! Which triangles of integer coordinates have more in common than their corners and edges, by exact
-//! clipping: one polygon is cut by the plane and the sides of the other, in homogeneous integers.
+//! Decides, exactly, whether two triangles with integer coordinates share more than common corners
+//! and a common edge. One triangle is clipped by the plane and the sides of the other, in
+//! homogeneous integers, so nothing is rounded.
 
 /// A point with integer coordinates, of at most 5 bits and a sign.
 pub type Point = [i64; 3];

@@ -1,5 +1,5 @@
-//! Part 1: which pixels a triangle covers. Corners are snapped to 1/256 pixel, so that every sign
-//! is exact in integers.
+//! The pixels that a triangle covers, and how much of each. Corners are snapped to 1/256
+//! pixel, so the sign of each side test is exact in integers.
 
 use super::polygon::{UNIT_BOX, area, clip_by};
 

@@ -1,4 +1,4 @@
-//! Part 5: how different two pictures look to someone who flips between them on a screen: LDR-FLIP
+//! The difference of two pictures to someone who flips between them on a screen: LDR-FLIP
 //! (Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and Fairchild 2020, "FLIP: A Difference
 //! Evaluator for Alternating Images"), written from the paper with its constants. 0: no difference
 //! that could be seen; 1: as large as there is.

@@ -6,13 +6,16 @@
 //! of an edge: caps and joins are round, and on a silhouette the outer half is drawn too. An edge
 //! is visible where no surface that is not incident to it lies in front.
 //!
-//! Five parts, each checked against the others by `tests/suite/accuracy/oracle_*.rs`:
+//! It has five parts. `tests/suite/accuracy/oracle_*.rs` check 1 to 3 against each other and
+//! against known values, and light and FLIP against known values.
 //! 1. [`coverage`]: which pixels a snapped triangle covers, by exact integer signs, and how much of
 //!    each.
 //! 2. [`lines::strip`] and [`lines::capsule`]: straight lines in closed form.
-//! 3. [`screen`], [`surface::visible`], [`lines::coverage`], [`surface::rays`],
-//!    [`lines::silhouette`]: any scene, by many points per pixel.
-//! 4. [`surface::light`]: the colour of a lit surface; [`surface::texture`]: the mean of a texture over a pixel.
+//! 3. Any scene: [`screen`] has its triangles, [`surface::visible`] the visible parts of its edges.
+//!    [`lines::coverage`], [`surface::rays`] and [`lines::silhouette`] use many points per pixel.
+//! 4. [`surface::light`]: the colour of a lit surface; [`surface::surroundings`]: what metals
+//!    mirror; [`surface::occlusion`]: the light that hollows lose; [`surface::texture`]: the mean
+//!    of a texture over a pixel.
 //! 5. [`flip`]: how different two pictures look.
 //!
 //! And of a mesh: [`contacts`], which triangles intersect.

@@ -1,5 +1,6 @@
-//! Convex polygons: clipping by a half plane, and area. About 1e-14 of the square of the
-//! coordinates' size: shift them first.
+//! Convex polygons: clipping by a half plane or by another polygon, and area. Rounding costs about
+//! 1e-14 of the square of the largest coordinate, so callers first shift polygons to near the
+//! origin.
 
 use super::vector::{V2, cross2, mix, sub};
 

@@ -1,4 +1,4 @@
-//! Part 3a: a scene's triangles on screen, and which of them are near a place.
+//! A scene's triangles on screen, and which of them are near a place.
 
 use super::camera::{Camera, project};
 use super::vector::{V2, V3, cross2, sub};

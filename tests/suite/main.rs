@@ -1,4 +1,4 @@
-//! The one integration binary: a folder per concern, and helpers in `support`.
+//! The one binary of all integration tests: a folder per concern, and helpers in `support`.
 
 // Helpers outside of #[test] functions may give up as loudly as tests do.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]

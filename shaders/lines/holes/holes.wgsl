@@ -1,11 +1,12 @@
 // The area of each pixel that lines leave free, where all edges of a surface are drawn as lines (stage lines). It
 // is the sum of the insets of the faces there: an inset is the part of a face that is at least half a line's width
-// from all its sides. Pixels in which this sum is not right are marked. Their coverage is found from points
-// (free_points.wgsl) or by drawing edge by edge (edge.wgsl). Twin of src/render/backend/cpu/lines/holes/mod.rs,
-// which explains insets, marks and points.
+// from all its sides. The kernel marks the pixels in which this sum is not right. Their coverage is found from
+// points (free_points.wgsl) or by drawing edge by edge (edge.wgsl). Twin of
+// src/render/backend/cpu/lines/holes/mod.rs, which explains insets, marks and points.
 //
-// The CPU goes from face to face. A thread here goes through the faces that are visible in its pixel and in the
-// eight around it, so that no two threads add to the same sum.
+// The CPU goes from face to face. Here a thread has a pixel, so that no two threads add to the same sum. It goes
+// through the faces that are visible in the pixel and in the eight around it, because an inset may reach into a
+// pixel none of whose samples shows its face.
 //
 // Uses: common.wgsl (LIT_PASS, OUTSIDE, pixel_corner, rn, rn2, sample_count, sample_offset, Vertex,
 // WORKGROUP), one_job.wgsl (batch, frame), geometry/triangle.wgsl (area_of, is_zero, setup_of),

@@ -1,6 +1,6 @@
 // The search for tips (stage lines): corners that are visible although no sample of their pixel shows their
-// triangle, such as the point of a spike. holes.wgsl finds faces by their samples, and so misses these. The pixels
-// around a tip are marked, and lines are drawn there edge by edge. Twin of
+// triangle, such as the point of a spike. holes.wgsl finds faces by their samples, and so misses these. This
+// kernel marks the pixels around a tip, and edge.wgsl draws the lines of marked pixels edge by edge. Twin of
 // src/render/backend/cpu/lines/holes/tips.rs.
 //
 // Uses: common.wgsl (mul_wide, OUTSIDE, rn, sample_count, sub_wide, Vertex, WORKGROUP),

@@ -2,8 +2,8 @@
 // marked colour breaks, places where the colour differs clearly. A pixel is mixed if it has a break between its
 // own samples, at a thin triangle in it, or across one of its four sides, or if a neighbour on one of these sides
 // has a strong break among its own samples. It gets 256 points if any of these breaks is strong, else 64. Pixels
-// in which a transparent layer is visible are left out. Twin of join and leave_layers in
-// src/render/backend/cpu/mixed/find/mod.rs.
+// in which a transparent layer is visible are left out, because layers are composited per sample. Twin of join and
+// leave_layers in src/render/backend/cpu/mixed/find/mod.rs.
 //
 // Each mixed pixel gets a number from an atomic counter. The order varies from run to run, but nothing depends on
 // it.

@@ -1,6 +1,7 @@
-//! Faces that two meshes have in common, faces that only one of them has, and faces that look to the other side (their
-//! corners run the other way round). Two faces are the same if they have the same three corners, in any order,
-//! whatever their numbers in the two files: `vertices` has found before which corners lie at the same place.
+//! Faces that two meshes have in common, faces that only one of them has, and faces that look to
+//! the other side (their corners run the other way round). Two faces are the same if they have the
+//! same three corners, in any order. Corners are compared by numbers from `vertices`, which are
+//! equal for vertices at the same place.
 
 use meshsnap_render::limits::{Budget, LimitExceeded};
 use meshsnap_render::mesh::Mesh;

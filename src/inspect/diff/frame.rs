@@ -1,5 +1,6 @@
-//! Positions of two meshes in one space. Each mesh is stored in a unit box of its own, so before two are compared, the
-//! positions of one are brought into the unit box of the other.
+//! Positions of two meshes in one space. Each mesh is stored in a unit box of its own, so before
+//! two are compared, the positions of one are brought into the unit box of the other. Also the
+//! distance below which two positions count as the same.
 
 use meshsnap_render::mesh::{Mesh, ToFile};
 

@@ -1,5 +1,5 @@
-//! The bounding box of a mesh in a report, in the file's own space, and the rounding of figures to the digits that
-//! mean something.
+//! The bounding box of a mesh in a report, in the file's own units. Also rounds figures to their
+//! significant digits: positions have 24 bits, about 7 digits.
 
 use meshsnap_render::mesh::Mesh;
 use serde::Serialize;

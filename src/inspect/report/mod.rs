@@ -1,7 +1,10 @@
-//! The report on a mesh: everything that is known of a file without drawing it.
+//! The report on a mesh: what its file contains, its topology, its area and its volume, found
+//! without drawing it. If they are asked for, it also has figures for 3D printing, the connected
+//! parts, and the UV charts.
 //!
-//! `meshsnap inspect --json` prints it and HTTP answers with it, in one shape. The names of the fields of a `Report`
-//! and of its parts are those of the JSON, and so part of the public interface.
+//! `meshsnap inspect --json` prints it and HTTP answers with it, in one shape. The names of the
+//! fields of a `Report` and of its parts are those of the JSON, and so part of the public
+//! interface.
 
 mod bounds;
 mod charts;

@@ -1,5 +1,7 @@
-//! The connected parts of a mesh, each with its own figures, and the loops of the mesh's open edges and of its sharp edges:
-//! those between faces that meet at a large angle.
+//! The section of a report on the connected parts of a mesh, each with its area and, if it is
+//! closed, its volume and genus, and on the mesh's loops. A loop is a set of connected edges that are
+//! all open (have one face) or all sharp (their two faces are turned by more than 30 degrees against
+//! each other).
 
 use serde::Serialize;
 

@@ -49,7 +49,7 @@ struct WallReport {
     open: u64,
 }
 
-/// Faces that look down and have nothing below.
+/// Faces that look down and do not lie on the bed.
 #[derive(Clone, Debug, Serialize)]
 struct OverhangReport {
     /// From the vertical.

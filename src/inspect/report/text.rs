@@ -1,4 +1,5 @@
-//! The report as text for a person: a name and a value per line.
+//! The report as text for a person: a name and a value per line. The sections that are optional
+//! (print, parts, UV charts) make their text themselves.
 
 use super::{Arity, CameraReport, Report, TextureReport, significant};
 use meshsnap_render::pluralise::pluralise;

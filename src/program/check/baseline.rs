@@ -1,6 +1,6 @@
-//! Baselines: folders in which the accepted faults of meshes are stored. A mesh with faults has a JSON file there; a
-//! fault that is in it, and has not grown, does not fail the mesh again. If views are asked for, the accepted
-//! pictures of the mesh lie beside that file.
+//! Baselines of `meshsnap check`: folders of accepted faults, which `--update` writes. A mesh with
+//! faults has a JSON file there; a fault that is in it, and has not grown, does not fail the mesh
+//! again. If views are asked for, the folder also has the accepted pictures of each mesh.
 
 use std::fs;
 use std::io::ErrorKind;

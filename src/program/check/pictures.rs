@@ -1,6 +1,7 @@
-//! Pictures for the reports of `meshsnap check`: a mesh from each view that is asked for, with marks where rules are
-//! broken. If it looked otherwise before, there are two more: the picture of before, and one of the difference.
-//! Before means the commit of `--since`, or else the accepted picture in the baseline.
+//! Pictures for the reports of `meshsnap check`: a mesh from each view that is asked for, and its
+//! topology from the first of them, with marks where rules are broken. If a picture looked
+//! otherwise before, there are two more: the picture of before, and one of the difference. Before
+//! means the commit of `--since`, or else the accepted picture in the baseline.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Files that are not yet written to their end, under the names that they have until then. If a signal ends the
+//! The list of the files that are being written, under their temporary names. If a signal ends the
 //! program, they are removed first, so that no unfinished file stays behind.
 
 use std::collections::BTreeSet;

@@ -1,5 +1,5 @@
-//! `render MESH... -o DIR/`: a picture of each mesh, drawn in parallel. A failure does not end the
-//! others.
+//! `render MESH... -o DIR/`: a picture of each mesh, drawn in parallel. A mesh that fails does not
+//! stop the others.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};

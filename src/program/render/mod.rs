@@ -1,4 +1,5 @@
-//! `meshsnap render`: draws a mesh into an image file.
+//! `meshsnap render`: draws a mesh into an image file, or each of several meshes into a file of a
+//! folder.
 
 mod batch;
 mod explain;

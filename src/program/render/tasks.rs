@@ -27,7 +27,7 @@ pub struct Tasks {
     pub all: Vec<Task>,
     /// Named files that are no meshes, for meshes that refer to them.
     pub companions: Vec<String>,
-    /// True if some meshes are left out, because their pictures are drawn already.
+    /// True if some meshes are left out, because they have not changed.
     pub is_part: bool,
 }
 

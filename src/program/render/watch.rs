@@ -1,8 +1,9 @@
 //! `render --watch`: draws again whenever a file that was read has changed.
 //!
-//! A file counts as changed if its length or its time of modification is another. Notifications of the system wake
-//! the program up early. Where there are none (network file systems, or too many watches), it looks at the files once
-//! a second, or less often if there are so many that looking takes long.
+//! A file counts as changed if its length or its time of modification is another. The program looks
+//! at all files once a second, or less often if there are so many that looking takes long.
+//! Notifications of the system make it look at once; there may be none, as on network file systems
+//! or with too many watches.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

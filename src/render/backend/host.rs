@@ -1,8 +1,10 @@
-//! The owner of the process's one GPU device, which all workers share. The device is opened when a job first needs
-//! it, and opened again after it was lost.
+//! The owner of the process's one GPU device, which all workers share. The device is opened when a
+//! job first needs it, and opened again after it was lost.
 //!
-//! Before a device draws with a number of samples per pixel for the first time, it has to draw a test picture with
-//! that number (`probe`). A device that draws it wrong is not used.
+//! Before a device draws with a number of samples per pixel for the first time, it has to draw a
+//! test picture with that number (`probe`). If it draws that wrong, this process uses no GPU any
+//! more. There is one exception: when a device that is opened again after a loss fails its first
+//! test picture, that counts as another loss.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};

@@ -5,7 +5,7 @@
 //! - transform moves vertices to the screen, visibility finds the nearest triangle of each sample (both in
 //!   `geometry`). A sample is one of the 1 to 16 places in a pixel at which the picture is computed.
 //! - occlusion finds how much less light hollows get (screen-space ambient occlusion).
-//! - peeling finds the transparent layers in front of each sample, from front to back (depth peeling).
+//! - peeling finds the transparent layers at each sample, from front to back (depth peeling).
 //! - shade computes colours (in `surface`).
 //! - mixed pixels, in or beside which faces of different colours meet, are drawn once more from many points each, if
 //!   samples are adaptive.
@@ -15,8 +15,8 @@
 //! A plan that has no use for a stage leaves it out.
 //!
 //! Each stage is written twice, in twins of the same name: `shaders/FOLDER/NAME.wgsl` and
-//! `src/render/backend/cpu/FOLDER/NAME.rs`. The module's tests compare the constants, structs and bindings that the
-//! two share. `select` chooses the back-end of a job, by `costs` while the GPU is busy. `host` owns the process's
+//! `src/render/backend/cpu/FOLDER/NAME.rs`. The module's tests compare the constants and structs that the two
+//! share. `select` chooses the back-end of a job, by `costs` while the GPU is busy. `host` owns the process's
 //! GPU, and [`probe`] checks a GPU before it is used.
 //!
 //! **Invariant:** nothing here imports a mesh or a scene, and the two back-ends do not import each other.

@@ -1,6 +1,7 @@
-//! The interface to another process in which decoders written in C and C++ run, so that a hostile
-//! file that makes one crash there does no harm here. A program may set such a process up: the
-//! sandbox of `meshsnap-cli` is one. Without it these decoders run in this process.
+//! The interface to another process in which decoders written in C and C++ run (FBX,
+//! meshoptimizer), so that a hostile file that makes one crash there does no harm here. A program
+//! may set such a process up, as `meshsnap-cli` does with its sandbox. Without it these decoders
+//! run in this process.
 
 use std::sync::OnceLock;
 

@@ -1,5 +1,6 @@
 //! The splitting of polygons into triangles: convex quads along the shorter diagonal, others by ear
-//! clipping, and very large ones as fans. Each triangle gets a mask of its edges that belong to the
+//! clipping, and those of more than 8192 corners as fans, because the time of ear clipping grows
+//! with the square of the corners. Each triangle gets a mask of its edges that belong to the
 //! polygon; the others are diagonals, which a drawing of the edges leaves out.
 
 use crate::import::normalise::pow2::{Pow2, exponent, is_usable, max_abs};
@@ -8,8 +9,8 @@ use crate::warning::Warning;
 /// The mask of a triangle whose three edges are all edges of its polygon.
 pub const ALL_EDGES: u8 = 0b111;
 
-/// Most corner tests of ear clipping in one file, about half a second. Past that it falls back to
-/// fans: clipping is quadratic, and a few hostile polygons would otherwise take minutes.
+/// Most corner tests of ear clipping in one file, about half a second. Past that, corners are cut off
+/// without tests: clipping is quadratic, and a few hostile polygons would otherwise take minutes.
 pub const WORK_MAX: u64 = 100_000_000;
 /// Squared lengths within this ratio count as equal. It is more than the rounding of coordinates in
 /// f32, or of f64 far away.

@@ -1,7 +1,7 @@
 //! Materials of a file, with their textures and images, and the file's cameras.
 //!
-//! Images stay encoded here and are decoded when a picture samples them. A texture that is not
-//! shown costs nothing.
+//! Images stay encoded here. A picture decodes those whose texels it needs, so textures that are
+//! not shown cost no decoding.
 
 use std::sync::Arc;
 

@@ -1,5 +1,6 @@
-//! Vertex normals for meshes whose files have none, which smooth shading needs. The normal at a vertex is
-//! the mean of the normals of its faces, each weighted by the angle of the face's corner there.
+//! Vertex normals for meshes whose files have none, which smooth shading needs. The normal at a
+//! vertex is the mean of the normals of its faces, each weighted by the angle of the face's corner
+//! there. So it does not depend on how a flat region was cut into triangles.
 
 use rayon::prelude::*;
 

@@ -1,6 +1,6 @@
-//! The triangles of a plan, with their positions, normals and materials: first those of the mesh, then
-//! small triangles that stand for its lines and points. The mesh itself is not changed, since triangles
-//! that face the camera belong to one picture.
+//! The triangles of a plan, with their positions, normals and materials: first those of the mesh,
+//! then small triangles that stand for its lines and points, then those of the ground's shadow. The
+//! mesh itself is not changed, since the added triangles belong to one picture.
 
 use super::CornerValues;
 use super::shared_slice::SharedSlice;

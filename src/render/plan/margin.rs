@@ -1,12 +1,12 @@
-//! The margin: the pixels beyond the picture's border for which visibility samples are taken, too. These
-//! say which face is visible there; nothing is drawn.
+//! The margin: the pixels beyond the picture's border for which visibility samples are taken, too.
+//! These say which face is visible there; nothing is drawn. Whether a plan has a margin is decided
+//! here: it has none where the whole mesh lies inside the picture.
 //!
-//! A line covers pixels on both sides of its edge, so a pixel at the picture's border may belong to a line whose
-//! edge lies beyond it. Whether a face hides that edge is only known where there are samples. So where faces may
-//! hide lines, and the mesh goes on beyond the picture, the visibility buffer (the nearest face of each sample)
-//! does too. The margin is so wide that the lines in a pixel at the border are those of the same pixel in the
-//! middle of a larger picture. Adaptive samples, for which a pixel is compared with its neighbours, need a margin,
-//! too.
+//! A line covers pixels on both sides of its edge, so a pixel at the picture's border may belong to
+//! a line whose edge lies beyond it. Only samples there tell whether a face hides that edge. With
+//! them, lines at the border look as they would in the middle of a larger picture. Adaptive
+//! samples, for which a pixel is compared with its neighbours, need a margin, too. How wide it has
+//! to be follows from the lines, and `build` passes it on.
 
 use super::DrawPlan;
 use super::context::{CHECK_EVERY, PlanContext};

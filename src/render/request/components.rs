@@ -1,7 +1,7 @@
-//! The schema of request documents, divided into named components of an OpenAPI document. Tools that
-//! generate clients take the names of their types from it. There is a component for each section of a
-//! document (such as `camera`), one for a material, one for the whole document, one for a document that
-//! names its mesh, and one for the keys of a query.
+//! The schema of request documents, divided into named components of an OpenAPI document. Tools
+//! that generate clients take the names of their types from these components. There is one for each
+//! section of a document (such as `camera`), one for a material, one for the whole document, one
+//! for a document that names its mesh, and one for the keys of a query.
 
 use serde_json::{Map, Value as Json, json};
 

@@ -37,7 +37,7 @@ pub struct Draft {
     pub sheet: Option<SheetDraft>,
     /// See [`Spec::light`].
     pub light: Light,
-    /// By default 0.3 where there are lamps, 1 where there are none.
+    /// By default the style's where there are lamps, 1 where there are none.
     pub ambient: Dependent<f32>,
     /// See [`Spec::image`].
     pub image: ImageSpec,

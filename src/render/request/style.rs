@@ -1,6 +1,6 @@
-//! The styles that a request can name, such as `wire` or `clay`, and the ambient light that each has by
-//! default. A style is a preset: it says which layers of a picture are drawn and how, and the other keys
-//! of the request override it.
+//! The styles that a request can name, such as `wire` or `clay`. A style is a preset, which the
+//! other keys of the request override. It says which layers of a picture are drawn and how
+//! (`layers_draft` has that), and how much ambient light and ambient occlusion there is by default.
 
 use crate::spec::words::word_enums;
 

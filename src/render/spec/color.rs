@@ -1,4 +1,5 @@
-//! Colours: sRGB in documents and files, linear light inside the program.
+//! The colours of a request. Documents and files have them in sRGB, such as `#f00`; [`Rgba`] holds
+//! them in linear light, in which the program computes.
 
 use crate::srgb::srgb_to_linear;
 

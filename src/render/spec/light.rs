@@ -9,7 +9,8 @@ word_enums! {
         Headlight = "headlight",
         /// Key, fill and rim lamps as in a studio; they turn with the camera.
         ThreePoint = "three-point",
-        /// Soft light from all sides of a photographer's tent, most of it from the left and above.
+        /// Large lamps at the left, at the right and above, as around a photographer's tent; the left one is the
+        /// strongest.
         Studio = "studio",
         /// No lamps: ambient light alone.
         None = "none",

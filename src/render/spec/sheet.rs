@@ -20,7 +20,7 @@ pub struct Sheet {
     /// Columns of the grid. None: as many as rows, or one more; a turntable is animated where the format
     /// can be.
     pub columns: Option<u32>,
-    /// Each view has its name written beside it.
+    /// Each view has its name written into its lower left corner.
     pub labels: bool,
 }
 

@@ -1,5 +1,6 @@
-//! KTX2 files with Basis Universal data, as the glTF extension KHR_texture_basisu has them: the largest image,
-//! transcoded to RGBA.
+//! KTX2 files with Basis Universal data, as the glTF extension KHR_texture_basisu has them: the
+//! largest image, transcoded to RGBA. A build without the feature `basis` reads the header alone
+//! and refuses the image.
 //!
 //! Offsets and field names are those of the KTX File Format, version 2.0, section 3
 //! (<https://registry.khronos.org/KTX/specs/2.0/ktxspec.v2.html>).

@@ -1,4 +1,5 @@
-//! The memory that this process may use by default: most of its container's limit, or else half of the machine's.
+//! The memory that this process may use by default: three quarters of its container's limit, or
+//! else half of the machine's memory.
 
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,9 @@
-//! The reading of a data folder that a server may be using: its jobs and meshes, for `meshsnap jobs`.
+//! Reads the jobs and meshes of a data folder that a server may be using, for `meshsnap jobs`. It
+//! changes nothing in the folder.
 //!
-//! The database of the folder is copied into memory, and the copy is opened. The server may write meanwhile, so a copy
-//! can mix several states of the database. redb checks every page of the copy. If it finds a mix, the database is
-//! copied anew.
+//! Only one process can open a redb database. So `read` copies the database into memory, and opens
+//! the copy. The server may write meanwhile, so a copy can mix several states of the database. redb
+//! checks every page of the copy. If it finds a mix, the database is copied anew, for at most 10 s.
 
 use std::fs::File;
 use std::io::{self, Read as _};

@@ -1,6 +1,8 @@
-//! `ETag`, `If-None-Match` and `Cache-Control`.
+//! The headers of HTTP caching: `ETag` and `Cache-Control` of answers, and the comparison of
+//! `If-None-Match` with a tag.
 //!
-//! The crate `headers` would save two lines, and bring older versions of base64 and SHA-1 with it.
+//! They are written by hand: the crate `headers` would save two lines, and bring older versions of
+//! base64 and SHA-1 with it.
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 

@@ -1,5 +1,6 @@
-//! The count of open event streams (`GET /v1/jobs/{id}/events`). A client may have a few at a time. All are ended when the
-//! server ends, so that it does not wait for them.
+//! Counts the open event streams (`GET /v1/jobs/{id}/events`) of each client, and refuses more than
+//! 32 at a time. `close` ends all of them when the server ends, so that the server does not wait
+//! for their clients.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -1,7 +1,9 @@
-//! The preferences of a client: `Accept` and `Prefer`.
+//! Reads the preferences of a client: the form of the answer (`Accept`), and whether and how long
+//! it waits for one (`Prefer`).
 //!
-//! `Accept` is read here because `headers` does not read it, and `headers-accept` differs in two ways: of forms that are liked
-//! equally it takes the client's first and not ours, and one malformed range makes it drop the header.
+//! `Accept` is read by hand. The crate `headers` does not read it, and `headers-accept` differs in
+//! two ways: of forms that a client accepts equally it takes the client's first and not ours, and
+//! one malformed range makes it drop the header.
 
 use std::time::Duration;
 

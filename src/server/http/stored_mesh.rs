@@ -1,4 +1,5 @@
-//! Stored meshes, as the handlers use them: found by the digest in a path, and made into the work of a job.
+//! Stored meshes, as the handlers use them: finds one by its digest, and makes the work of a job on
+//! it, or on an upload.
 
 use std::sync::Arc;
 

@@ -1,7 +1,8 @@
-//! Names that clients give their requests (`Idempotency-Key`), so that one that is sent again makes no second job.
+//! Names that clients give their requests (`Idempotency-Key`): a request that is sent again under
+//! its name makes no second job.
 //!
-//! A claim is such a name while it stands for a job. It lives as long as its job can be found, so that there are no more
-//! claims than jobs.
+//! A claim is such a name while it stands for a request and the request's job. It ends when the
+//! request is refused, or when the job can no longer be found, so that claims do not pile up.
 
 use std::collections::HashMap;
 use std::fmt;

@@ -1,5 +1,6 @@
-//! The thread that ends jobs whose time is up, and drops expired results. A worker that still has not stopped after a
-//! grace is reported, and another is started in its place unless too many are stuck.
+//! The thread that ends jobs whose time is up. If a worker still has not stopped after a grace, the
+//! thread logs that, counts it against the mesh (`watchdog.rs`), and starts another worker in its
+//! place, unless too many are stuck.
 //!
 //! `JobRegistry::wait_for_late` decides what is late. It sleeps until something is, and drops expired results meanwhile.
 

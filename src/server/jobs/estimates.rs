@@ -1,9 +1,10 @@
 //! Estimates of the time and the memory that jobs take, learnt from earlier jobs.
 //!
-//! An estimate is a formula of the job's size (bytes that are to be read, and samples that are to be drawn), times a
-//! factor. There is a factor for each kind of job: its task, its back-end, and whether its mesh was drawn before. For the
-//! time, there is also one for each kind of job on a stored mesh that was drawn before: such a mesh is asked for again and
-//! again, and its size in bytes says little about what it takes.
+//! An estimate is a formula of the job's size (bytes that are to be read, and samples that are to
+//! be drawn), times a factor. There is a factor for each kind of job: its task, its back-end, and
+//! whether its mesh was drawn before. For the time, there is also a factor for each pair of a kind
+//! of job and a stored mesh that was drawn before: such a mesh is asked for again and again, and
+//! its size in bytes says little about what it takes.
 
 use std::hash::{BuildHasher as _, RandomState};
 use std::sync::{Mutex, PoisonError};
@@ -64,7 +65,7 @@ pub struct Estimates {
     kinds: Mutex<[f64; KINDS]>,
     /// Factors between the memory of jobs and its formula, by kind.
     memory: Mutex<[f64; KINDS]>,
-    /// The same by [`Size::mesh`].
+    /// Powers of two of the factors of single meshes, by [`Size::mesh`].
     meshes: Cache<u64, f64>,
     hasher: RandomState,
 }

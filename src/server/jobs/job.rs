@@ -94,7 +94,7 @@ impl Work {
     }
 }
 
-/// A request for a picture, as it was sent.
+/// A request for a picture, a check or a comparison, as it was sent.
 #[derive(Clone, Debug, Default)]
 pub struct Recipe {
     /// The bytes of the document.

@@ -1,5 +1,5 @@
 //! Jobs: a bounded queue, worker threads that each own a renderer, and the results. A job draws a
-//! picture, judges a mesh, compares two, or writes the report on one that is to be stored.
+//! picture, judges a mesh, compares two, or writes the report on one.
 //!
 //! Architecture invariants: a full queue refuses at once and never waits. An accepted job is never
 //! dropped before its end. A panic costs its job alone. Nothing here knows HTTP.
@@ -68,9 +68,9 @@ pub struct JobSettings {
     pub result_ttl: Duration,
     /// Time for which a result waits for being fetched.
     pub unfetched_ttl: Duration,
-    /// Most encoded bytes of kept results. The oldest are dropped first.
+    /// Most encoded bytes of kept results. `results.rs` says which are dropped first.
     pub result_bytes: u64,
-    /// Most kept results. The oldest are dropped first.
+    /// Most kept results. `results.rs` says which are dropped first.
     pub result_count: usize,
     /// The memory of the process.
     pub memory: Arc<Memory>,

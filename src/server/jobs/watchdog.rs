@@ -1,12 +1,12 @@
-//! Workers that do not stop when the time of their job is up: a bug keeps them busy, and nothing can end a thread from
-//! outside.
+//! Counts the workers that do not stop when the time of their job is up, and the meshes with which
+//! that happens. A bug keeps such a worker busy, and nothing can end a thread from outside.
 //!
-//! After a grace such a worker is reported, and another takes its place, unless the number of stuck ones is more than
-//! twice that of workers in the settings. If its job ends after all, the worker ends itself, or goes on in the place
-//! of a stuck one that was not replaced.
+//! After a grace, `clock.rs` reports such a worker and starts another in its place, unless the
+//! number of stuck ones is more than twice that of workers in the settings. If its job ends after
+//! all, the worker ends itself, or goes on in the place of a stuck one that was not replaced.
 //!
-//! A mesh that has kept a worker busy in this way twice is refused from then on. The last 1024 meshes that have done
-//! so at least once are remembered.
+//! A mesh that has kept a worker busy in this way twice is refused from then on. The last 1024
+//! meshes that have done so at least once are remembered, until the server ends.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

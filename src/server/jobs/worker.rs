@@ -1,5 +1,6 @@
-//! The worker threads. Each takes one job after the other and does it with its own renderer, the function that draws,
-//! judges or compares. A panic fails its job alone: the worker goes on with a new renderer.
+//! The worker threads. Each takes one job after the other and does it with its own renderer, the
+//! function that draws, judges, compares or reports. A panic fails its job alone: the worker goes
+//! on with a new renderer.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;

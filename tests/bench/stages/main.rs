@@ -6,7 +6,7 @@
 //!     cargo bench --bench stages -- --threads 1 --rounds 50
 //!     cargo bench --bench stages -- --growth                  # time and memory against triangles, pixels, samples
 //!     cargo bench --bench stages -- --growth --write          # the same into docs/growth.md and docs/growth.svg
-//!     cargo bench --bench stages -- --fill                  # triangles and samples a second, one thread
+//!     cargo bench --bench stages -- --fill                  # triangles and samples per second, one thread
 //!     cargo bench --bench stages -- --samples               # fixed numbers of samples, and adaptive ones
 //!     cargo bench --bench stages -- --gate                    # fails where a stage has become slower
 //!     cargo bench --bench stages -- --write                   # keeps today's ratios for the gate

@@ -1,4 +1,4 @@
-//! The meshes that are timed: made here, so that a clone measures the same as everybody.
+//! The meshes that are timed. They are made here, so that every checkout measures the same ones.
 
 use std::fmt::Write as _;
 

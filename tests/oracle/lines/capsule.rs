@@ -1,4 +1,4 @@
-//! Part 2b: a straight piece of line with round caps, in closed form.
+//! The share of a pixel that a line segment with round caps covers, in closed form.
 
 use super::super::polygon::{UNIT_BOX, area, clip, clip_by};
 use super::super::vector::{V2, cross2, dot, mix, sub, unit};

@@ -1,4 +1,4 @@
-//! Part 3c: lines' coverage of each pixel, by many points per pixel.
+//! The share of each pixel that lines cover, by many points per pixel.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Lines: how much of each pixel they cover.
+//! Lines: the share of each pixel that they cover.
 
 pub mod capsule;
 pub mod coverage;

@@ -1,15 +1,16 @@
-//! Part 3e: what a hull should show: all points within its width of an edge where the surface ends,
-//! on the side where the surface is not, and nearer than any surface there.
+//! The area that a hull (an outline that is drawn as a mesh) should cover: all points
+//! within its width of a silhouette edge, on the side away from the surface, and nearer than any
+//! surface there. The code calls a silhouette edge with its hull a rim.
 //!
-//! Around a corner it goes as far as the next edge where the surface ends. Where faces of this
-//! corner hide one of the two, the surface goes on between them: there it is not where such a face
-//! is.
+//! At a corner, the area of an edge reaches around to the next silhouette edge. If a face of the
+//! corner hides one of the two edges, the surface continues between them, and the area leaves out
+//! the faces of the corner.
 //!
-//! A hull recedes. Where it ends it lies half its width behind the edge, so that what is next to
-//! the edge hides it and what is far behind does not. A face that turns away faster than that is
-//! continued beyond its edge, up to five times as fast, and the hull lies a twentieth of its width
-//! behind that: a hull of what goes on elsewhere in the same plane does not lie over it. Depth is
-//! even in between.
+//! Beyond its edge, a hull recedes from the viewer. At its outer border it lies half its width
+//! behind the edge: what is next to the edge hides it, and what is far behind does not. Where the
+//! plane of the edge's face recedes faster, up to five times, the hull follows that plane, a
+//! twentieth of its width behind it. Another face in the same plane, such as the next tooth of a
+//! gear, then hides the hull. From the edge to the border, depth is linear.
 
 use std::collections::BTreeMap;
 

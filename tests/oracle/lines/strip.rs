@@ -1,4 +1,4 @@
-//! Part 2a: an infinite straight line, in closed form.
+//! The share of a pixel that an infinite straight line covers, in closed form.
 
 use super::super::vector::V2;
 

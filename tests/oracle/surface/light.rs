@@ -1,9 +1,9 @@
-//! Part 4: the colour of a lit surface.
+//! The colour of a lit surface.
 //!
 //! Each lamp adds Lambert's diffuse light and a GGX highlight (Walter et al. 2007) in the short
 //! form that needs no visibility term of its own (Karis 2013, "Optimizing PBR for Mobile"), with a
-//! reflectance of 0.04 head on. Light from everywhere is brighter from above than from below. Metals have highlights of
-//! their own colour, and mirror their surroundings.
+//! reflectance of 0.04 head on. Ambient light is brighter from above than from below. Metals have
+//! highlights of their own colour, and mirror their surroundings. Light above 0.8 is rolled off.
 
 use super::super::vector::{V2, V3, cross, dot, length, sub, unit};
 use super::surroundings::{blurred, mirror_image};

@@ -1,4 +1,5 @@
-//! Surfaces: what is seen of them, and its colour.
+//! Surfaces: the visible parts of edges, the pictures that scenes should have, and the colours of
+//! what is seen.
 
 pub mod light;
 pub mod occlusion;

@@ -1,8 +1,8 @@
-//! Part 4b: the light that hollows go without.
+//! Screen-space ambient occlusion: the share of light that a surface in a hollow loses.
 //!
-//! Rays to places all around, on screen, spread evenly over directions and distances. Where one meets
-//! a surface that rises above the place's own, that surface takes light: more the higher it stands,
-//! and less the farther away it is.
+//! Around a place on screen, many points are looked at, spread evenly over directions and
+//! distances. A surface that is seen there and rises above the place takes light from it: more the
+//! steeper it rises, and less the farther away it is.
 
 use super::super::camera::Camera;
 use super::super::screen::{Scene, Screen};

@@ -1,4 +1,5 @@
-//! Part 3d: what is seen at a point, and pictures of whole scenes, by many rays a pixel.
+//! The picture that any scene should have, by many points per pixel: the nearest surface at a point,
+//! each triangle's share of a pixel, and whole pictures, with lines over the surfaces.
 
 use rayon::prelude::*;
 

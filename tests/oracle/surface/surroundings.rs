@@ -1,5 +1,6 @@
-//! The surroundings that metals mirror, a dark room with windows: by definition, blurred by soft edges, and, what that
-//! stands in for, integrated over the lobe of a rough surface.
+//! The surroundings that metals mirror: a dark room with windows. `blurred` is how renderers have
+//! to draw them, with soft edges that are wider for rough metals. `mirrored` is what that stands in
+//! for: the integral over the lobe of a rough surface.
 
 use super::super::vector::{V3, cross, dot, unit};
 

@@ -1,6 +1,6 @@
-//! Part 3b: which parts of an edge are visible. On screen an edge and a triangle are straight and
-//! their depths are affine, so what a triangle hides of an edge is an interval whose ends are the
-//! roots of four affine functions.
+//! The visible parts of an edge. On screen an edge and a triangle are straight and their depths
+//! are affine, so what a triangle hides of an edge is an interval. Its ends are roots
+//! of four affine functions: the three sides of the triangle, and the difference in depth.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,5 @@
-//! The benchmark of run time against error measures what it says, and what it writes can be read.
+//! Tests of the benchmark of run time against error (`tests/bench/accuracy/`): its errors rank the
+//! techniques as they should, and its plot, JSON, table and page are well-formed and complete.
 
 use std::sync::OnceLock;
 

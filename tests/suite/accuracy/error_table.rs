@@ -1,5 +1,6 @@
-//! The error that the program expects of a picture: its table is what was measured, and holds
-//! elsewhere.
+//! Tests of the table of errors by which the program chooses a technique for `max_error`: it
+//! follows from the measurement in `docs/accuracy.json`, and it holds on meshes that were not
+//! measured for it.
 
 use std::path::{Path, PathBuf};
 

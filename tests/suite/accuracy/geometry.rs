@@ -1,5 +1,6 @@
-//! The samples that triangles own: each exactly once, up to and behind the eye, on every machine
-//! alike.
+//! Tests of the samples that triangles own. Triangles without gaps between them own each sample
+//! exactly once, also beyond the guard band and around the eye. Instruction sets and threads change
+//! no byte of a picture, and the GPU has the same samples.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::{CpuRenderer, Isa};

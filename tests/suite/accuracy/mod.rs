@@ -1,4 +1,5 @@
-//! The distance of pictures from the truth, and tests that the gates can fail.
+//! The distance of pictures from the truth, which `tests/oracle/` computes. A gate is the largest
+//! error that a test lets pass; `mutations.rs` tests that gates can fail.
 
 pub mod adaptive;
 pub mod behind_eye;

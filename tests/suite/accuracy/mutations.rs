@@ -1,5 +1,5 @@
-//! The gates can fail: wrong pictures, each made wrong in the way of a known technique, do not get
-//! through. The right ones, made by the same means, do.
+//! Tests that the gates can fail: they refuse what is wrong in the way of a known technique, such
+//! as normals in f32, and let pass what is right and made by the same means.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::CpuRenderer;

@@ -1,4 +1,5 @@
-//! The oracle's FLIP and rims are what is known of them.
+//! Tests of the oracle's FLIP, against results of its authors' program, and of its rims (the true
+//! outlines of silhouettes), against areas in closed form.
 
 use crate::oracle::camera::Camera;
 use crate::oracle::flip::Seen;

@@ -1,5 +1,5 @@
-//! The oracle's scenes and light: what it finds visible against what its rays see, and what is
-//! known otherwise.
+//! Tests of the oracle's scenes and light: visible parts of edges against its rays; contours,
+//! normals and light against known values.
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,7 +1,7 @@
-//! The distance of outlines' outer borders from their true place: goal 5. The truth is the widened
-//! contour: all points within the outline's width of it, of a contour's own line within half. An
-//! outline in units of the model is as wide as these are at the depth of the point of the contour
-//! that it surrounds.
+//! The distance of outlines' outer borders from their true place: goal 5 of `docs/accuracy.md`. The
+//! truth is the widened contour. For a hull, it is all points within the outline's width of the
+//! contour; for a contour line, which lies half inside, within half its width. Where a width is in
+//! units of the model, it is measured at the depth of each point of the contour.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::CpuRenderer;

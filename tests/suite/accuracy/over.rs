@@ -1,5 +1,5 @@
-//! The accuracy of colours where lines lie over a surface and its border: against the oracle's
-//! points, in bytes' steps, of pixels that see both the line and what is beside it.
+//! The accuracy of colours where lines lie over a surface and its border, against the oracle's
+//! points, in 1/255. Only pixels that a line covers in part count.
 
 use meshsnap_render::image::Image;
 use meshsnap_render::limits::Deadline;

@@ -1,4 +1,5 @@
-//! The colours of whole pixels of one face, and the normals behind them.
+//! The accuracy of colours in pixels that show one face alone, of the surroundings that metals
+//! mirror, and of face normals.
 
 use meshsnap_render::image::Image;
 use meshsnap_render::limits::Deadline;

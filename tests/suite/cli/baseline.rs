@@ -1,4 +1,5 @@
-//! Accepted faults, and meshes that changed since a commit.
+//! `meshsnap check` with `--baseline`, accepted faults, and with `--since`, meshes that changed
+//! since a commit.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! `meshsnap diff`: words, exit codes and mistakes.
+//! `meshsnap diff` of two meshes or two pictures: words, exit codes, mistakes, and the pictures
+//! that it writes.
 
 use std::fs;
 use std::path::Path;

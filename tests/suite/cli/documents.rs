@@ -1,6 +1,7 @@
-//! Types the commands of README.md and of documents in docs/ as they stand there, and looks at what each prints and
-//! writes. Only the server's address and the words SHA256 and ID, which stand for what an earlier answer has given, are
-//! replaced.
+//! Runs the commands of README.md and of documents in docs/ as they stand there, and checks what
+//! each prints and writes. Only the server's address and the words SHA256 and ID, which stand for
+//! what an earlier answer has given, are replaced. Commands that need more than a test has, such as
+//! a container engine, are not run; each says why.
 
 use std::path::Path;
 use std::process::{Command, Output, Stdio};

@@ -1,4 +1,4 @@
-//! Lines and points, from every format that has them.
+//! Lines and points in OBJ, PLY, OFF and FBX files. Those of glTF are in `gltf/basics.rs`.
 
 use crate::support::data;
 use crate::support::files::damage::{cut_everywhere, mutate};

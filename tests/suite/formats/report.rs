@@ -1,4 +1,5 @@
-//! The report: facts of each format, measures against closed forms, hostile meshes.
+//! The report of `inspect`: metadata of the formats, area and volume against closed forms, and
+//! hostile meshes in bounded memory.
 
 use crate::support::files::mesh::{Gltf, Read, Solid, read};
 use crate::support::files::ply::Encoding;

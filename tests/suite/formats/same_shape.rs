@@ -1,5 +1,6 @@
-//! Every format that is read gives the same mesh for the same shape, and the shape keeps what
-//! matters.
+//! One shape in OBJ, STL, glTF and PLY is the same mesh; OFF, FBX and 3MF are compared in their own
+//! files. Also tests what the import makes of a file: scale, normals of slivers, welded positions,
+//! and faces and attributes that are dropped or repaired.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use crate::support::files::mesh::{Gltf, Solid, read, read_as};

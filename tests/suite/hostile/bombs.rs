@@ -1,5 +1,5 @@
-//! Small uploads made to cost a lot, sent to a server: each is refused, or drawn without the part that costs,
-//! and takes next to no memory.
+//! Small uploads made to cost a lot, sent to a server: each is refused, or drawn without the part
+//! that costs, and the server grows by less than 64 MiB.
 //!
 //!     cargo test --release --test suite bombs -- --nocapture
 //!

@@ -1,10 +1,12 @@
-//! Seeds of every fuzz target, cut off at every byte and changed at random. Says how long the
-//! slowest answer took, and what stays in memory.
+//! Seeds of every fuzz target, cut off at every byte (those of the pipeline at every seventh) and
+//! changed at random: none may panic or allocate much. Prints how long the slowest answer took, and
+//! what stays in memory.
 //!
 //!     cargo test --test suite hostile::cut -- --nocapture
 //!     MESHSNAP_HOSTILE=100000 cargo test --release --test suite hostile::cut -- --nocapture     as many for each target
 //!
-//! The long version holds memory too: there no other test runs beside it.
+//! With `MESHSNAP_HOSTILE`, it also asserts that resident memory grows by at most a twentieth.
+//! Other tests that run beside it in the process can raise that figure.
 
 use crate::hostile::fuzzed::{files, root, targets};
 use crate::support::files::mesh::Noise;

@@ -1,4 +1,5 @@
-//! The fuzz targets, without a fuzzer: what they are, and that every seed and every former find passes.
+//! The fuzz targets, without a fuzzer: each importer has one, and every seed and every former find
+//! passes.
 
 use meshsnap_render::import::Format;
 use std::collections::BTreeSet;

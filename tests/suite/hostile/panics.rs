@@ -1,4 +1,5 @@
-//! A decoder of another crate that panics: the job's file is refused, and the server goes on.
+//! A decoder of another crate that panics: the job's file is refused, and the server goes on. If
+//! the decoder read a texture, the file is drawn without that texture.
 
 use crate::formats::fbx::basics::cube;
 use crate::formats::gltf::packed::Sheet;

@@ -1,4 +1,5 @@
-//! The files of `deploy/`: valid by the tools of those who read them, and settings that `serve` knows.
+//! The files of `deploy/` are valid for the tools that read them, and each setting in them is one
+//! that `serve` knows.
 
 use std::path::Path;
 use std::process::Command;

@@ -1,4 +1,5 @@
-//! Rules that the source itself keeps.
+//! Rules for the repository itself: the source tree, documents, the library's interface, and
+//! `deploy/`.
 
 mod deploy;
 mod documents;

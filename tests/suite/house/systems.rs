@@ -1,5 +1,6 @@
-//! Code of one system alone is compiled for that system alone: `cargo xtask cross` checks the program for the others,
-//! where their targets are installed, and this holds everywhere.
+//! Code for one operating system stands behind a `cfg` for that system. This test reads the source,
+//! so it runs on every machine; `cargo xtask cross` compiles the program for the other systems, and
+//! needs their targets installed.
 
 use super::structure::{code, sources};
 

@@ -1,5 +1,5 @@
-//! The daemon over HTTP: bad input and bad manners. Each is refused precisely, and the next request
-//! is fine.
+//! The daemon over HTTP: bad input, bodies that are too large or end early, and slow clients. Each
+//! is refused with its own code, and the server answers the next request.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::time::{Duration, Instant};

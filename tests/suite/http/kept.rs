@@ -1,5 +1,5 @@
-//! Stored meshes and their pictures that stay in memory: what is kept is never wrong, never too much,
-//! and made once.
+//! The caches of stored meshes and of their pictures: they change no answer, stay within their
+//! sizes, and a picture is drawn once.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use std::sync::atomic::{AtomicBool, Ordering};

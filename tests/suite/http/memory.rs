@@ -1,4 +1,6 @@
-//! One budget of memory for everything that the server does and keeps.
+//! `--memory-bytes`, one budget of memory for everything that the server does and keeps: caches
+//! give way to uploads, what does not fit is refused, and all memory of jobs and answers is given
+//! back.
 
 use std::io::Write as _;
 use std::time::{Duration, Instant};

@@ -1,5 +1,5 @@
-//! `/v1/meshes` of the real server: stored once, reported as `inspect --json` does, known by
-//! digest.
+//! `/v1/meshes` of the real server: a mesh is stored once, under its digest, and its report is what
+//! `inspect --json` prints.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use std::io::Read as _;

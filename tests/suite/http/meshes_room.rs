@@ -1,4 +1,5 @@
-//! The room for stored meshes: who goes first, and that nothing goes beyond it.
+//! The limits of the mesh store: the least recently used mesh is evicted first, and stored bytes
+//! never exceed `--mesh-bytes`, in which meshes that are still being drawn count too.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use std::sync::atomic::{AtomicBool, Ordering};

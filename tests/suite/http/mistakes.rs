@@ -1,4 +1,5 @@
-//! The daemon over HTTP: mistakes that people make, and that the answer says what to do instead.
+//! Mistakes that people make in requests: the answer names the mistake and says what to do instead.
+//! Also the warnings in the header of a picture.
 
 use crate::http::answers::{FORM, form};
 use crate::http::meshes::head;

@@ -1,4 +1,5 @@
-//! An error or a time in place of techniques, as clients ask for it.
+//! Quality targets: requests that give a largest error or a time instead of samples and techniques.
+//! The program chooses these, and says what it chose.
 
 use crate::support::server::{Answer, CUBE_OBJ, Server, meshsnap};
 

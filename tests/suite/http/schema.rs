@@ -1,4 +1,5 @@
-//! The JSON Schema of the request document: stored, served, and of one mind with the reader.
+//! The JSON Schema of the request document: the stored one is the generated one, it accepts the
+//! documents that the reader of requests accepts, and the server serves it with its own limits.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
-//! Sheets: each cell is the picture that its view gives alone, each frame is one cell, and a turntable
-//! keeps its mesh in place.
+//! Sheets: each cell is the picture that its view gives alone. The frames of a turntable are the
+//! cells of its grid, and the mesh has the same size in all of them.
 
 use std::io::Cursor;
 

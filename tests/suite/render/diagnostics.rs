@@ -1,5 +1,6 @@
-//! Diagnostics as colours, each against the numbers of an independent computation: the colours of a plan
-//! are read back as places on the published maps.
+//! Diagnostics as colours (`surface.debug`), each against the numbers of an independent
+//! computation: the colours of a plan are read back as places on the published colour maps, viridis
+//! and cool-warm.
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,5 @@
-//! Everything under api/examples works as it lies there.
+//! Everything under api/examples: the requests are drawn, alike on both back-ends, the meshes are
+//! what their generators here make, and the curl line that the server prints works.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

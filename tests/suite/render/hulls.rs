@@ -1,5 +1,6 @@
-//! Hulls of very many edges: what they are made of is bounded, and they end soon when their job
-//! does.
+//! Hulls (outline meshes). A hull of very many edges has few triangles in a small picture, and
+//! building and drawing it stop soon after its job. Both back-ends draw hulls alike, and lines that
+//! end inside a shape leave nothing beside their ends.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::CpuRenderer;

@@ -1,5 +1,5 @@
-//! Transparent layers: the same on both back-ends sample for sample, and what sorting every sample
-//! by hand gives.
+//! Transparent layers: both back-ends find the same ones in every sample, and pictures are what a
+//! reference gives that sorts and blends the triangles of each sample in f64.
 
 use std::borrow::Cow;
 

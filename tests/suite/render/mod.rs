@@ -1,4 +1,5 @@
-//! Pictures: the same on every back-end, and as they should be.
+//! Tests of pictures: the back-ends agree, and pictures are compared with stored ones, with
+//! formulas and with independent computations.
 
 pub mod adaptive;
 pub mod diagnostics;

@@ -1,5 +1,5 @@
-//! Every real mesh in every style on the CPU: drawn, the right size, not blank. The GPU draws every third of the
-//! pictures (all in a long run), and they are alike.
+//! Every real mesh in five styles on the CPU: drawn, the right size, not blank. The GPU draws every
+//! third of the pictures (all in a long run), and they are alike.
 //!
 //! `MESHSNAP_CONTACT_SHEET=FILE.png` also stores them all in one picture, to be looked at.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
@@ -97,7 +97,7 @@ fn assert_drawn(name: &str, style: &str, picture: &Image) {
     assert!(across || along, "{name}, {style}: does not fill the frame");
 }
 
-/// All pictures, five a row.
+/// All pictures, ten per row.
 #[derive(Default)]
 struct Sheet {
     pictures: Vec<Image>,

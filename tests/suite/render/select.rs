@@ -1,5 +1,5 @@
-//! The choice of back-end: with devices that are missing, wrong or lost, or that refuse; and once
-//! with a real one.
+//! The choice of back-end: with fake devices that are missing, wrong, busy or lost, or that refuse
+//! a plan; and once with the machine's own.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,5 +1,6 @@
-//! The CPU's shortcuts change nothing: small triangles in lanes, what lies behind tiles, colours
-//! found once per triangle, rows that are encoded while others are drawn.
+//! The CPU's shortcuts change no byte: small triangles in SIMD lanes, triangles left out where
+//! tiles hide them, colours found once per triangle, samples kept from picture to picture, and rows
+//! that are encoded while others are drawn.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::{CpuRenderer, Isa};

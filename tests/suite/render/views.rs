@@ -1,4 +1,4 @@
-//! Cameras that look past the mesh: said where the picture is blank, and nowhere else.
+//! The warning for cameras that look past the mesh: it comes only where the picture is blank.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::CpuRenderer;

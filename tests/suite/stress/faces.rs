@@ -1,4 +1,5 @@
-//! Thin faces, faces without area, sizes that do not go together, and numbers that are none.
+//! Thin faces, faces without area, tiny faces beside huge ones, denormal coordinates, and
+//! coordinates that are not finite.
 
 use meshsnap_render::backend::cpu::CpuRenderer;
 use meshsnap_render::import::MeshFault;

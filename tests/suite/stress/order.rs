@@ -1,5 +1,5 @@
-//! The picture is the mesh's, not the file's: the order of faces and vertices and their winding
-//! leave no trace.
+//! The order of faces, vertices and corners in a file and the winding of its faces change no pixel.
+//! Of outlines, two pixels may differ by 1/255.
 
 use meshsnap_render::image::Image;
 

@@ -1,4 +1,5 @@
-//! Whoever asks is told what was dropped, snapped, degenerate or too coarse.
+//! Reports of `inspect` and warnings of jobs: they say what was dropped, snapped, degenerate or too
+//! coarse.
 
 use std::io::Write as _;
 use std::process::Stdio;

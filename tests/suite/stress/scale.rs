@@ -1,4 +1,5 @@
-//! A model is the same model in millimetres and in light years.
+//! Scaled models. A scale of 2^k changes no byte, and another one hardly a pixel. No style depends
+//! on the unit or the axes of a file.
 
 use meshsnap_render::backend::Renderer as _;
 use meshsnap_render::backend::cpu::CpuRenderer;

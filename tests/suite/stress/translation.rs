@@ -1,5 +1,6 @@
-//! A model far from the origin is the same model as long as its file says so; where the file
-//! cannot, that is said.
+//! Models far from the origin. Files with f64 coordinates, OBJ among them, give the same vertices
+//! on screen, to 1/512 px. Files with f32 coordinates whose positions are too coarse give a
+//! warning, or an error if nothing is left.
 
 use meshsnap_render::import::MeshFault;
 use meshsnap_render::mesh::Mesh;

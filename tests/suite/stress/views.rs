@@ -1,5 +1,5 @@
-//! Awkward views: through a keyhole and all around, pictures of one pixel and of millions, from
-//! inside, edge on.
+//! Awkward views: fields of view from 0.01 to 179 degrees, pictures from one pixel to the limit,
+//! the eye inside the mesh or on a corner of it, and flat meshes seen edge on.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::CpuRenderer;

@@ -1,4 +1,4 @@
-//! Counts what each thread allocates, so that a test can say how much work a job was without a
+//! Counts the bytes that each thread allocates, so that a test can say how much work a job was without a
 //! clock.
 #![allow(unsafe_code)] // `GlobalAlloc` is an unsafe trait; this is test code, and it only counts
 

@@ -1,4 +1,5 @@
-//! A machine whose GPUs are missing, wrong, lost or refuse, as a test tells them.
+//! Fake GPUs: a machine whose devices are missing, wrong, lost or refuse jobs, as a test tells
+//! them. They draw on the CPU.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::Receiver;

@@ -1,4 +1,5 @@
-//! The GPU that all tests share, and others for tests that count what their own draws.
+//! The GPU that all tests share, opened with 64-bit atomics and without, and others for tests that
+//! count what their own draws.
 
 use std::sync::{Arc, OnceLock};
 

@@ -1,4 +1,5 @@
-//! From plans to what the oracle works with.
+//! Turns plans into what the oracle takes, in f64: scene, visible segments, material, lights and
+//! normals.
 
 use meshsnap_render::plan::{DrawPlan, Faces, Shown, SurfacePass};
 

@@ -1,4 +1,5 @@
-//! The distance of points from a shape on screen, as outlines measure it.
+//! The distance of points from a shape on screen, from which the accuracy tests know what its
+//! outline should cover.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,5 @@
-//! Pictures, and how far they are from the truth.
+//! Measures how far pictures are from the truth that the oracle computes. Also the switch between
+//! short and long runs.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::CpuRenderer;

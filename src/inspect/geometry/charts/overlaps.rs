@@ -1,9 +1,9 @@
 //! Faces that overlap others in the texture, and the areas that they cover.
 //!
-//! Two faces overlap if their interiors have a point in common. That is so where no edge of either face, made longer
-//! to a line, has one face on one side and the other face on the other. Exact predicates decide on which side of a
-//! line a point lies. Areas are those of polygons in f64, with a bound of their rounding. A tree of boxes finds the
-//! pairs of faces that may overlap.
+//! Two faces overlap if their interiors have a point in common: if no line along an edge of either
+//! face separates them. Exact predicates decide on which side of a line a point lies. Areas are
+//! those of polygons in f64, with a bound of their rounding. A tree of boxes finds the pairs of
+//! faces that may overlap.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};

@@ -1,7 +1,9 @@
-//! The reports of `meshsnap check` that are written to files, as JUnit XML, SARIF, Markdown, HTML or JSON Lines. All
-//! are made of the same verdicts, the results of the files.
+//! The reports of `meshsnap check` that are written to files, as JUnit XML, SARIF, Markdown, HTML
+//! or JSON Lines. All are made of the same verdicts; a verdict is the result of the checks of one
+//! file.
 //!
-//! Equal verdicts make equal bytes: no report has the time of the run, its duration or the name of the machine.
+//! Equal verdicts make equal bytes: no report has the time of the run, its duration or the name of
+//! the machine.
 
 mod html;
 mod junit;

@@ -1,4 +1,5 @@
-//! Faults as SARIF 2.1.0, the format by which code hosts annotate files.
+//! The report of `meshsnap check` as SARIF 2.1.0, the format by which code hosts annotate files: a
+//! result for each rule that a file breaks.
 
 use std::path::{Component, Path};
 

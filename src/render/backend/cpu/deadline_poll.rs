@@ -1,5 +1,6 @@
-//! Checks, in loops over triangles and the like, whether a job's time is up. The next check follows after a certain
-//! amount of work, about 10 ms, because a triangle may have one sample or millions.
+//! The check, in loops over triangles and the like, whether a job has to stop, for example because
+//! its time is up. It is made about every 10 ms, counted in work (tested samples, and a fixed cost
+//! per triangle) and not in triangles alone: a triangle may have one sample or millions.
 
 use crate::limits::Deadline;
 

@@ -1,5 +1,5 @@
-//! The measuring of how long each stage of a picture takes, for reports. Nothing that is drawn depends on these
-//! times.
+//! A stopwatch for the stages of a picture that the CPU draws, for reports. Nothing that is drawn
+//! depends on these times.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};

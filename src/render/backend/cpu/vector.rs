@@ -1,5 +1,5 @@
-//! Arithmetic of vectors with three components, such as products and unit vectors, for the stages shade and lines.
-//! Functions take one vector, or `N` side by side as `[component][lane]`.
+//! Arithmetic of vectors with three components, such as products and unit vectors, for the stages
+//! shade and mixed. Functions take one vector, or `N` side by side as `[component][lane]`.
 
 /// Scalar product.
 #[inline(always)]

@@ -1,6 +1,7 @@
-//! The GPU buffers in which one job is drawn (a job draws one picture): its input, what the stages compute, and the
-//! picture's bytes. When the job is done, the whole set of buffers is kept for a later job, because allocating
-//! buffers anew takes time. How much memory the kept sets may take is limited.
+//! The GPU buffers in which one job is drawn (a job draws one picture): its input, what the stages
+//! compute, and the picture's bytes. When a job has succeeded, its set of buffers is kept for a
+//! later job, because allocating buffers anew takes time. The finished picture takes along the
+//! buffer that holds its bytes. A set that would exceed the limit of memory for kept sets is freed.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

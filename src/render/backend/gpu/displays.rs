@@ -1,7 +1,8 @@
-//! A switch that turns off the layer in which Mesa orders GPUs for Vulkan, where all that the layer could do is
-//! print an error. The layer asks the Wayland display which GPU the display uses. In containers and services the
-//! variable `XDG_RUNTIME_DIR`, by which a display is found, is often not set, and the layer prints that to
-//! standard error. Pictures need no display: they are never drawn into a window.
+//! A switch that turns off Mesa's Vulkan layer that orders GPUs, if all that the layer could do is
+//! print an error. The layer asks the Wayland display which GPU the display uses. In containers and
+//! services the variable `XDG_RUNTIME_DIR`, by which a display is found, is often not set, and the
+//! layer prints that to standard error. Pictures need no display: they are never drawn into a
+//! window.
 
 #![allow(unsafe_code)]
 

@@ -1,15 +1,18 @@
-//! The GPU back-end, which draws pictures with wgpu, without a window. Its stages are those of the CPU back-end,
-//! written as compute shaders.
+//! The GPU back-end, which draws pictures with wgpu, without a window. Its stages are those of the
+//! CPU back-end, written as compute shaders.
 //!
-//! In reading order: `device` opens a GPU, and `handles` holds the parts of it that buffers need; `schedule` computes
-//! the dispatches for a plan (all that is to be drawn for one picture); `recorder` turns them into commands;
-//! `pipelines` holds each kernel's source, bindings and specialisation; `stage_clock` times the stages; `params`
-//! holds the uniforms, `buffers` the memory of a job (the drawing of one picture), which `upload` fills, `staging`
-//! the buffers that pictures are read from, `residents` the data of meshes that stay in memory for the next job,
-//! `gang` the jobs that share dispatches, `pass_mask` the passes over triangles, `linear` pictures in linear light.
-//! `displays` keeps a driver from looking for a window system.
+//! In reading order: `device` opens a GPU, and `handles` holds the parts of it that buffers need;
+//! `schedule` computes the dispatches for a plan (all that is to be drawn for one picture) as a
+//! list of steps; `execute` in this file walks through the steps, and `recorder` writes the
+//! commands of each; `pipelines` holds each kernel's source, bindings and specialisation;
+//! `stage_clock` times the stages; `params` holds the uniforms, `buffers` the memory of a job (the
+//! drawing of one picture), which `upload` fills, `staging` the buffers that pictures are read
+//! from, `residents` the data of meshes that stay in memory for the next job, `gang` the jobs that
+//! share dispatches, `pass_mask` the passes over triangles, `linear` pictures in linear light.
+//! `displays` keeps Mesa from looking for a window system.
 //!
-//! **Invariant:** a job uses the device on one thread only, because wgpu's error scopes belong to a thread.
+//! **Invariant:** a job uses the device on one thread only, because wgpu's error scopes belong to a
+//! thread.
 
 mod buffers;
 mod device;

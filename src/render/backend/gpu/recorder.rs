@@ -1,5 +1,6 @@
-//! The recorder of one job's commands (a job draws one picture): it turns the steps of a
-//! [`Schedule`](super::schedule::Schedule) into wgpu commands, hands them to the device, and reads back what the
+//! The recorder of one job's commands (a job draws one picture). `execute` in the parent module
+//! walks through the steps of a [`Schedule`](super::schedule::Schedule) and calls the recorder for
+//! each. The recorder writes the wgpu commands, hands them to the device, and reads back what the
 //! device has written.
 
 use std::collections::HashMap;

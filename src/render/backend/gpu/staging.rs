@@ -22,7 +22,7 @@ pub struct ReadbackPool(Mutex<Spare>);
 struct Spare {
     /// The oldest first.
     buffers: Vec<wgpu::Buffer>,
-    /// True from the first job that takes a buffer until no job draws any more. Buffers are kept while it is true.
+    /// True from the first job that takes a buffer until the last renderer is dropped. Buffers are kept meanwhile.
     is_open: bool,
 }
 

@@ -4,7 +4,8 @@
 //! One is about textures that are made of other textures: the square of their number, times the
 //! number of all textures. The other searches the sets of texture coordinates and tangents for each
 //! entry of a layer (`LayerElement`). The names of these nodes are counted in the bytes before the
-//! file is parsed, as binary files and text files write them. A doubtful case counts.
+//! file is parsed, as binary files and text files write them. Bytes that only look like such a name
+//! count, too.
 
 use crate::import::context::Context;
 use crate::import::{MeshError, MeshFault};

@@ -1,5 +1,5 @@
-//! Local numbers of corners. A mesh is worked on in pieces, which are consecutive triangles with at
-//! most 65,535 corners. Within a piece each distinct corner gets a number, in the order of first
+//! Local numbers of corners. Normalisation works on a mesh in pieces of consecutive triangles with
+//! at most 65,535 corners. Within a piece each distinct corner gets a number, in the order of first
 //! use. These numbers fit 16 bits, so that the table by which they are found is small.
 
 use super::geometry::Key;

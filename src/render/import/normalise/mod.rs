@@ -2,8 +2,8 @@
 //! Positions in f64 become f32 in a box whose sides are at most 1, triangles with a NaN, an
 //! infinity or no area are dropped, and equal positions are welded (made one).
 //!
-//! All scaling up to that box is by powers of two, which rounds nothing, so that a file scaled by a
-//! power of two gives the same mesh.
+//! Positions are scaled to that box by powers of two alone. This rounds nothing, so a file scaled
+//! by a power of two gives the same mesh.
 
 pub(crate) mod attributes;
 mod faces;

@@ -1,6 +1,7 @@
 //! Wavefront OBJ. The text is cut into parts (`cut`), which several threads parse at the same time
-//! (`parse`) and which are then put together (`assemble`). An error in a line names the line. The
-//! memory that parsing takes is estimated from the text and checked against the limit before.
+//! (`parse`) and which are then put together (`assemble`). An error in a line names the line.
+//! Before parsing, the memory that it takes is estimated from the text and spent from the job's
+//! budget.
 //!
 //! MTL files, which describe materials, are read by [`mtl`]; [`materials`] makes the mesh's
 //! materials and images from them.

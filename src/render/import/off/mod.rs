@@ -1,8 +1,9 @@
 //! OFF, the object file format of Geomview (its manual, "OFF: Object File Format"): text or binary,
 //! with prefixes for normals, colours and texture coordinates, and with colours per face.
 //!
-//! [`header`] reads the keyword, [`text`] (by [`words`]) and [`binary`] are the two encodings of
-//! the numbers, [`vertices`] and [`faces`] keep them, and [`colors`] decodes colours.
+//! [`header`] reads the keyword, [`text`] (which [`words`] splits into words) and [`binary`] read
+//! the two encodings of the numbers, [`vertices`] and [`faces`] keep them, and [`colors`] decodes
+//! colours.
 
 mod binary;
 mod colors;
@@ -37,7 +38,8 @@ struct Counts {
 #[derive(Clone, Copy, Debug)]
 struct Number {
     value: f64,
-    /// True if it is written as a whole number. In a colour that means 0 to 255 instead of 0 to 1.
+    /// True if it is written as a whole number. Whole numbers and fractions in colours have a scale
+    /// each.
     is_whole: bool,
 }
 

@@ -1,6 +1,6 @@
 //! The body of an OFF file that is text. The numbers that a vertex or a face must have may be
-//! spread over several lines. Numbers that follow on the last of these lines belong to it too, such
-//! as a face's colour.
+//! spread over several lines. Further numbers on the last of these lines belong to the same vertex
+//! or face, such as a face's colour.
 
 use super::header::Header;
 use super::words::Words;

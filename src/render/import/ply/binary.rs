@@ -1,5 +1,6 @@
-//! The body of a binary PLY file, in either byte order. Triangles in their most frequent layout are
-//! read by several threads.
+//! The body of a binary PLY file, in either byte order. As long as faces are triangles in their
+//! most frequent layout (a count of 8 bits, three indices of 32 bits), all records have the same
+//! length, and several threads read them.
 
 use super::header::Kind;
 use super::layout::{Layout, Step};

@@ -1,5 +1,5 @@
 //! The vertices of a PLY file (its element `vertex`): positions, normals, colours and texture
-//! coordinates. Binary records without lists are read by several threads.
+//! coordinates. Binary records without lists have the same length, so several threads read them.
 
 use super::conversion::{linearise, upright};
 use super::header::{Element, Kind};

@@ -1,8 +1,9 @@
-//! Kinds of files that are recognised but not read: other mesh formats, archives, pictures. They
-//! are refused, with advice where there is some (convert it, unpack it).
+//! Kinds of files that are recognised but not read: other mesh formats, archives, pictures. Each
+//! has the words in which callers refuse it, with advice where there is some (convert it, unpack
+//! it).
 //!
-//! Without this, a file that holds lines of a mesh by chance would be read as one: a tar archive of
-//! OBJ files does.
+//! Without this, a file of another kind that holds lines of a mesh would be read as a mesh, such as
+//! a tar archive of OBJ files.
 
 use crate::import::text::trim_start;
 

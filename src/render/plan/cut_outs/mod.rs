@@ -1,9 +1,10 @@
-//! Cut-outs: faces with a texture whose alpha mask makes parts of them invisible, such as a card with a
-//! leaf on it. It is found which of these faces, and which sides of them, show no texel at all. Such a
-//! side gets no outline, and the camera is not fitted to such a face (`framing`).
+//! Cut-outs: faces with a texture whose alpha mask makes parts of them invisible, such as a card
+//! with a leaf on it. This module finds which of these faces, and which of their sides, show no
+//! texel at all. Such a side gets no outline (`silhouettes`), and the camera is not fitted to such
+//! a face (`framing`).
 //!
-//! The result depends on the mesh alone and is found once for it, from the texels of its images. It is
-//! conservative: where it is not certain that nothing is visible, something counts as visible.
+//! The result depends on the mesh alone and is found once for it, from the texels of its images. It
+//! is conservative: a face or a side counts as visible unless certainly nothing of it shows.
 
 mod pyramid;
 

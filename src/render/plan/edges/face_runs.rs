@@ -1,9 +1,9 @@
-//! Runs of 32 consecutive faces of a mesh, each with a bounding box and a cone that contains its normals.
-//! By these it is decided for a whole run whether it is in the picture of a camera and whether it faces
-//! the viewer.
+//! Runs of 32 consecutive faces of a mesh, each with a bounding box and a cone that contains its
+//! normals. From these, `view_of_runs` finds for a whole run which side it shows to the viewer and
+//! where on screen it lies.
 //!
-//! Consecutive faces are mostly neighbours. If they are not, the box and the cone are wide, and each face
-//! has to be looked at.
+//! Consecutive faces are mostly neighbours. If they are not, the box and the cone are wide and tell
+//! little, and each face has to be looked at.
 
 use std::ops::Range;
 

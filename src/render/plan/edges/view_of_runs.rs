@@ -1,7 +1,7 @@
-//! Runs of faces as one view shows them. A run is 32 consecutive faces of a mesh, with a bounding box and
-//! a cone that contains their normals (`face_runs`). Box and cone tell whether all faces of the run
-//! surely show the same side to the viewer, and in which rectangle on screen they lie. Where they do, the
-//! faces need not be tested one by one.
+//! Runs of faces as one view shows them. A run is 32 consecutive faces of a mesh, with a bounding
+//! box and a cone that contains their normals (`face_runs`). Box and cone tell whether all faces of
+//! the run surely show the same side to the viewer, and in which rectangle on screen they lie.
+//! Where this is known, the faces need not be tested one by one.
 
 use super::face_runs::FaceRun;
 use crate::mesh::Mesh;

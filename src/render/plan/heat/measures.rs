@@ -1,6 +1,6 @@
-//! The numbers that diagnostic pictures show as colours: the quality of a triangle's shape, the mean
-//! length of its edges, the stretch of its texture, and the mean curvature at a vertex. They are computed
-//! in f64, each operation rounded by itself.
+//! The numbers that diagnostic pictures show as colours: the quality of a triangle's shape, the
+//! mean length of its edges, the stretch of its texture, and the mean curvature at a vertex. They
+//! are computed in f64 without fused multiply-add, so that they are the same on every machine.
 
 use super::CHECK_EVERY;
 use crate::limits::Deadline;

@@ -1,9 +1,10 @@
-//! Chains of silhouette edges: visible parts of these edges, where a surface ends on screen, that are
-//! joined at vertices. Chains that are too short are not drawn, unless they border the background or
-//! leave the picture.
+//! Chains of silhouette edges, which are edges where a surface ends on screen. A chain consists of
+//! the visible parts of such edges that are joined at vertices. Chains that are too short are not
+//! drawn, unless they border the background or leave the picture. Nor is a long run of parts drawn
+//! if surfaces closely behind hide most of its outline: a dotted line would be left.
 //!
-//! Scans and coarse meshes have a multitude of tiny folds. Each has a silhouette of a few pixels, and an
-//! outline beside it would look like a crumb.
+//! Scans and coarse meshes have a multitude of tiny folds. Each has a silhouette of a few pixels,
+//! and an outline beside it would look like a speck of dirt.
 
 use crate::limits::{Deadline, Stopped};
 use crate::mesh::union_find::UnionFind;

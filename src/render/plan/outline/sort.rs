@@ -1,5 +1,5 @@
-//! Sorting of long lists, for the corners of outlines. It works in steps, between which it is checked whether the
-//! job has to end.
+//! Sorting of long lists, for the corners of outlines. A list is sorted in parts, and the job's
+//! deadline is checked before each, so that a job whose time is up ends soon.
 
 use std::cmp::Ordering;
 

@@ -1,7 +1,8 @@
 //! Line and point primitives of the file, which have no area.
 //!
-//! Those whose material has a filled surface are triangles that face the camera and are shaded with the
-//! surface ([`geometry`]). The others are lines of exact width in pixels ([`line_passes`]).
+//! Those whose material has a filled surface are triangles that face the camera and are shaded with
+//! the surface ([`geometry`]). The others are lines of exact width in pixels ([`line_passes`]) if
+//! their material has a wire or an outline, and are not drawn if it has neither.
 
 pub mod depth_cue;
 mod lines;

@@ -1,7 +1,8 @@
-//! The measured error and time of each drawing technique (a way to draw the edges of faces, wires or outlines), by
-//! back-end and number of samples: `error_table.json`. By it, `quality` selects what a request with a quality
-//! target leaves open. The benchmark writes it (`cargo bench --bench accuracy -- --write`), and the file explains
-//! its numbers.
+//! The table of measured errors and times, `error_table.json`, as `quality` reads it. It has a row
+//! for each drawing technique (a way to draw the edges of faces, wires or outlines), back-end and
+//! number of samples. From these rows follow the error and the time to expect of a picture of any
+//! size. The benchmark writes the table (`cargo bench --bench accuracy -- --write`), whose key
+//! `about` explains its numbers.
 
 use std::sync::LazyLock;
 

@@ -1,5 +1,5 @@
-//! The lamps of each lighting preset of a request. They are placed around the viewer, so that every view
-//! of a model is lit equally well.
+//! The lamps of each lighting preset of a request. They are placed around the viewer, so that every
+//! view of a model is lit equally well. Only the key light may have a direction from the request.
 
 use glam::DVec3;
 

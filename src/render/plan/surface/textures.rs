@@ -1,6 +1,6 @@
-//! The loader of the images that materials sample. An image is decoded only if it is sampled, once per
-//! way of reading its texels (as colours, as numbers, or with an alpha cutoff), and only to the size that
-//! the picture can show.
+//! The loader of the images that materials sample. An image is decoded only if it is sampled, once
+//! per way of reading its texels (as colours, as numbers, or with an alpha cutoff). Mip levels that
+//! are finer than the picture can show are not made.
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;

@@ -1,6 +1,7 @@
-//! The check that refuses a request with duplicate keys. The key may be given twice under the same name,
-//! or under a short and a long one (`samples` and `image.samples`). The sender meant both values, and one
-//! would be lost.
+//! The check that refuses a document or a query with duplicate keys. A key may be given twice under
+//! the same name, or under a short and a long one (`samples` and `image.samples`). The sender meant
+//! both values, and one would be lost. On a command line, later flags override earlier ones
+//! instead.
 
 use std::collections::BTreeMap;
 

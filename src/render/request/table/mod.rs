@@ -1,6 +1,6 @@
 //! The table of keys: everything that a request document may contain. The reader, its error
-//! messages, the JSON Schema and the list of capabilities follow from it. A new key is one entry of
-//! [`keys`], beside the field of the spec that it sets.
+//! messages, the JSON Schema and the list of capabilities follow from it. A new key needs one entry
+//! of [`keys`], and the field of the spec that it sets.
 
 pub(crate) mod dependent;
 pub(crate) mod field;

@@ -1,7 +1,8 @@
 //! A client's socket, with two timeouts that the HTTP libraries lack.
 //!
-//! 1. A client that stops reading its answer is disconnected after a while, and so is one that reads it more slowly than
-//!    at the least rate: a byte now and then does not keep the answer in memory.
+//! 1. A client that stops reading its answer is disconnected after 30 s, and so is one that reads
+//!    it more slowly than `--least-rate-bytes` asks. Otherwise a client that reads a byte now and
+//!    then would keep its answer in memory.
 //! 2. After an answer that came before the upload ended (413), the rest of the upload is read and
 //!    thrown away for a moment. Closing at once would reset the connection, and the client would
 //!    never see the answer.

@@ -1,4 +1,5 @@
-//! Connections: the accept loop and the client's socket, both with limits on how long a client may be silent.
+//! Connections of clients: `accept` takes or refuses them, `places` limits their number, and
+//! `activity` and `io` (a client's socket) limit how long a client may be silent.
 
 pub mod accept;
 pub mod activity;

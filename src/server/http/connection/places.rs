@@ -1,6 +1,7 @@
-//! Limits on the number of open connections: of all clients together, and of one address (of IPv6, a network of 64
-//! bits). A few more connections are kept for questions about health (such as `/healthz`), one question each, which
-//! are answered although all other connections are taken.
+//! Limits on the number of open connections: of all clients together, and of one address (of IPv6,
+//! a network of 64 bits). A few more are kept for requests about health (such as `/healthz`), one
+//! request each. These are answered although all other connections are taken, so that a full server
+//! is not taken for a dead one.
 
 use std::collections::HashMap;
 use std::net::IpAddr;

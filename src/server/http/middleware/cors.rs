@@ -1,4 +1,5 @@
-//! The CORS headers, by which browsers let pages of other origins use the interface: those that `--cors-origins` names.
+//! The CORS headers, by which browsers let pages of the origins in `--cors-origins` use the
+//! interface.
 
 use std::time::Duration;
 

@@ -1,5 +1,7 @@
-//! The step around the router that gives each request an id and a span in log and traces, and logs how it ended. It also
-//! writes the body of an error, a problem document (RFC 9457), because the id of the request is part of it.
+//! The step around the router that gives each request an id and a span in log and traces, and logs
+//! how it ended. It also writes the body of an error, a problem document (RFC 9457), because the id
+//! of the request is part of it. With HTTP/1, it reads what the handler has left of the request's
+//! body, or announces that the connection closes (`drainable_body.rs`).
 
 use std::sync::Arc;
 use std::time::Instant;

@@ -1,4 +1,6 @@
-//! `Idempotency-Key`: a request that is sent again, because its answer was lost, makes no second job.
+//! `Idempotency-Key`: a request that is sent again, because its answer was lost, makes no second
+//! job. This file reads the header and computes the digest of the request; `jobs/claims.rs` keeps
+//! name and digest as long as the job can be found.
 
 use std::sync::Arc;
 

@@ -1,9 +1,10 @@
 //! The reading of requests: from HTTP to work for a worker. The cheapest refusals come first.
 //!
-//! [`query`] reads the query, [`body`] the body within its limits. [`check`] and [`diff`] read requests for verdicts,
-//! whose parameters [`keys`] reads. [`meshes`] makes a job of each mesh of a form. [`sender`] knows who sends a request,
-//! [`idempotency`] whether it was sent before, [`webhook`] which address is told of its job's end. [`upload`] names a mesh
-//! by its content.
+//! This file reads requests for pictures, and [`check`] and [`diff`] those for verdicts, whose
+//! parameters [`keys`] reads. [`query`] reads the query, [`body`] the body within its limits.
+//! [`meshes`] makes a job of each mesh of a form. [`sender`] tells who sends a request,
+//! [`idempotency`] whether it was sent before, [`webhook`] which address is told of its job's end.
+//! [`upload`] names a mesh by its content.
 
 pub mod body;
 pub mod check;

@@ -1,4 +1,5 @@
-//! `/`: a page that says what this is.
+//! `/`: an HTML page that says what the server does, with a command to try and links to the rest of
+//! the interface.
 
 use std::sync::LazyLock;
 

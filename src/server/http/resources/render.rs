@@ -1,4 +1,4 @@
-//! `POST /v1/render`: draws a mesh, or a stored mesh that the body names.
+//! `POST /v1/render`: draws the mesh in the body, or a stored one that the body names.
 
 use std::sync::Arc;
 

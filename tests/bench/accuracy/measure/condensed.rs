@@ -1,6 +1,6 @@
-//! `src/render/plan/quality/error_table.json`: what was measured, a row for each technique on each kind of
-//! back-end with each number of samples. The program chooses by it where a request asks for an
-//! error or a time.
+//! Makes `src/render/plan/quality/error_table.json` from `docs/accuracy.json`: a row for each
+//! technique that a request can ask for, on each kind of back-end with each number of samples. The
+//! program chooses by this table where a request asks for an error or a time.
 
 use std::fmt::Write;
 

@@ -1,4 +1,4 @@
-//! `docs/accuracy.md`: the goals, what was measured, and how to read the plot.
+//! The text of `docs/accuracy.md`: the goals, what was measured, and how to read the plots.
 
 use std::fmt::Write;
 

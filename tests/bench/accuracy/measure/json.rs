@@ -1,4 +1,4 @@
-//! The results as JSON that says what it means.
+//! `docs/accuracy.json`: the measured rows, and in the document itself what each field means.
 
 use std::fmt::Write;
 

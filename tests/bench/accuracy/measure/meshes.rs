@@ -1,5 +1,5 @@
-//! Meshes that the benchmark makes itself, as OBJ text. Flat ones lie in the x-y plane, a unit a
-//! pixel.
+//! Meshes that the benchmark makes itself, as OBJ text. Flat ones lie in the x-y plane, one unit
+//! per pixel.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;

@@ -1,5 +1,5 @@
 //! The benchmark of run time against error, in parts that the test suite runs too: scenes,
-//! techniques, what is true of each, and rounds that time them.
+//! techniques, the true picture of each scene, and timed rounds.
 
 // Each binary that includes this module uses its own part of it. A tool for developers: giving up
 // loudly is fine.

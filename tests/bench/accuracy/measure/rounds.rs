@@ -1,5 +1,5 @@
-//! Draws a scene's cases in rounds, so that whatever slows the machine slows all of them, and
-//! measures their pictures.
+//! Draws a scene's cases (each technique with each number of samples) on every back-end in rounds,
+//! so that whatever slows the machine slows all of them, and measures times and errors.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

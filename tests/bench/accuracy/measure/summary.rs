@@ -1,4 +1,5 @@
-//! Rows of many scenes as one point, and what follows from them.
+//! Summaries of the measured rows: geometric means over a family's scenes, which are the points of
+//! the plots, and the lead of exact wires over the next best technique.
 
 use meshsnap_render::spec::{Samples, WireMethod};
 

@@ -1,7 +1,8 @@
 //! The techniques that are compared, and the requests that ask each of them for the same picture.
 //!
 //! Lines are w pixels wide in truth. The approximating wire methods have no such number; each gets
-//! the parameters with which it is w wide where its own measure is right:
+//! the parameters with which it is w wide where its own measure is right. t is `wire.thickness`, s
+//! is `wire.smoothing`, and b is the barycentric coordinate that is 0 on the edge:
 //! - `fwidth`, `fwidth-min`: a wire is full up to t and gone at t + s, in multiples of |db/dx| +
 //!   |db/dy|, which is a pixel for an edge along the axes; both triangles of an edge draw it, so it
 //!   is 2t + s wide (half of each ramp counted). s = min(w, 1), t = (w - s) / 2. On diagonals that

@@ -1,4 +1,5 @@
-//! Faces that are thinner than the distance of samples: adaptive samples show as much of them as there is.
+//! Faces that are thinner than the distance between samples: adaptive samples draw their true
+//! coverage, and fixed samples lose some of them.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::image::Image;

@@ -1,4 +1,5 @@
-//! Metals that mirror sharply: their light changes within a face, so that adaptive samples shade each quarter of a pixel.
+//! The accuracy of metals that mirror sharply. Their light changes within a face, so with adaptive
+//! samples a face may be shaded in each quarter of a pixel.
 
 use meshsnap_render::plan::DrawPlan;
 use meshsnap_render::spec::Samples;

@@ -1,4 +1,5 @@
-//! The reports of `meshsnap check`.
+//! The reports that `meshsnap check` writes: SARIF, JUnit, JSON lines, Markdown, and pages with
+//! pictures.
 
 mod pages;
 mod schemas;

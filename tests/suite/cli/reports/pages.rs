@@ -1,4 +1,5 @@
-//! The pages in a browser (headless Chromium): accessibility by axe-core, at two widths, light and dark.
+//! HTML pages in headless Chromium, checked for accessibility by axe-core, at two widths, light and
+//! dark: the reports of `meshsnap check`, and the server's page at `/`.
 
 use std::fs;
 use std::path::{Path, PathBuf};

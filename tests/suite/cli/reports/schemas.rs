@@ -1,4 +1,4 @@
-//! Reports for other programs, against the schemas by which those programs read them.
+//! SARIF and JUnit reports, against the schemas by which other programs read them.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! Bundles: names, what they mean from inside one, and which file is the mesh.
+//! Bundles: which names files may have, how a name inside a bundle is resolved, and which file is
+//! the mesh.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use crate::support::files::mesh::Read;

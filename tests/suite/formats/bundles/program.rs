@@ -1,5 +1,5 @@
 //! Bundles through the real program: forms, archives and command lines give the same pictures and
-//! the same warnings.
+//! the same warnings, and hostile forms are refused.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use std::process::Output;

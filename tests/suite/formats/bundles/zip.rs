@@ -1,5 +1,5 @@
-//! Zip archives: the honest are read, and each kind of dishonest one is refused for what it is,
-//! fast.
+//! Zip archives: sound ones are read, and each kind of dishonest one is refused with its own
+//! reason, within a bound on memory.
 
 use crate::support::files::archive::{Raw, archive};
 use meshsnap_render::import::{Bundle, MeshFault, import};

@@ -1,4 +1,5 @@
-//! The parts of an FBX scene that are drawn, and its numbers that are not finite.
+//! FBX: which parts of a scene are drawn (hidden nodes and coarse levels of detail are not), and
+//! materials with numbers that are not finite.
 
 use crate::support::files::fbx::{Node, Value, ascii, binary, file, geometry, model, node, properties, property, text};
 use crate::support::files::mesh::{Solid, codes, read};

@@ -1,4 +1,5 @@
-//! glTF: primitive modes, accessor encodings, the node tree, buffers, extensions.
+//! glTF: primitive modes, accessor encodings, the node tree, materials with vertex colours, and
+//! what is counted of a file.
 
 use crate::support::files::mesh::{Gltf, Read, corners, read};
 use meshsnap_render::import::MeshFault;

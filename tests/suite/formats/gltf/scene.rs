@@ -1,4 +1,5 @@
-//! glTF: cameras of the scene; polygons in the order of triangles.
+//! glTF: cameras of the scene, and polygons that the order of triangles encodes
+//! (`FB_ngon_encoding`).
 
 use crate::formats::gltf::surfaces::surface;
 use crate::support::files::mesh::codes;

@@ -1,4 +1,5 @@
-//! glTF: what a file says about its surfaces.
+//! glTF: materials, their textures and texture coordinates, and what of them is broken or not
+//! drawn.
 
 use crate::support::data;
 use crate::support::files::bundle::read_bundle;

@@ -1,4 +1,4 @@
-//! OBJ as found in the wild.
+//! OBJ: forms of the text, faces with different attributes, materials, and colours of vertices.
 
 use crate::support::files::mesh::{Solid, read};
 use crate::support::files::same::assert_same_shape;

@@ -1,5 +1,5 @@
-//! OBJ as editors, old programs and careless exporters write it, and every input that is known to
-//! break the parser beneath.
+//! OBJ as editors, old programs and careless exporters write it, and inputs that are known to break
+//! another parser, the crate `tobj`.
 
 use crate::support::files::bundle::{files, read_bundle};
 use crate::support::files::damage::{cut_everywhere, mutate};

@@ -1,4 +1,5 @@
-//! PLY files that are broken or hostile: a precise sentence, no panic, no long wait, no memory.
+//! PLY files that are broken or hostile: the error says what is wrong and where, and memory is
+//! bounded.
 
 use crate::support::data::{self, large_folder};
 use crate::support::files::mesh::{read, read_as};

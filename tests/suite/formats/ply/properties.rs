@@ -1,4 +1,5 @@
-//! PLY in every encoding: what each property becomes.
+//! PLY in every encoding: types and order of properties, other elements, triangle strips, line
+//! ends.
 
 use crate::support::files::mesh::{Solid, codes, read};
 use crate::support::files::ply::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
@@ -23,8 +24,6 @@ fn polygons() -> Solid {
     solid.polygons.push((base + 6..base + 11).collect());
     solid
 }
-
-/// The codes of its warnings.
 
 #[test]
 fn every_encoding_draws_what_obj_draws() {

@@ -1,9 +1,10 @@
-//! Valid files are drawn, broken ones are refused, and every exception has a reason: each mesh of
-//! the test data, sent to a server, beside what the Khronos glTF validator says of it.
+//! Sends each mesh of the test data to a server: valid files are drawn, on both back-ends alike,
+//! and broken ones are refused. A file counts as broken if the Khronos glTF validator found errors
+//! in it; its reports lie beside the glTF files. Each exception has a reason in `explained.rs`.
 //!
 //!     cargo test --test suite agreement -- --nocapture
 //!
-//! prints it all as a Markdown table. The reasons are in `explained.rs`.
+//! prints it all as a Markdown table.
 
 use crate::formats::real_files::explained::{EXPLAINED, UNLIKE};
 use crate::support::data::{self, files};

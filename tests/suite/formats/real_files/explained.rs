@@ -1,4 +1,5 @@
-//! The files on which meshsnap and the validator disagree, and why: one line for each.
+//! The exceptions of `agreement.rs`, one line for each with its reason: files on which meshsnap and
+//! the validator disagree, and files that are refused though no validator speaks of them.
 //! `agreement.rs` holds that there are no others, and that none of these is out of date.
 
 /// Files that the validator calls broken and that are read all the same; that are valid, and

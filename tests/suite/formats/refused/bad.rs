@@ -1,4 +1,4 @@
-//! Broken meshes: the right fault, a useful sentence, no panic, no long wait.
+//! Broken meshes: the right fault, a useful sentence, no panic, and a bound on memory.
 
 use crate::support::files::mesh::{Noise, Solid, glb, read, read_as};
 use crate::support::files::ply::Encoding;

@@ -1,5 +1,5 @@
-//! Small files that would cost a lot: what is shown many times and read once, and what grows with
-//! the square of its number.
+//! Small files that could cost a lot. What many nodes or materials refer to is parsed once, long
+//! names are cut, and FBX files whose cost is the square of their size are refused.
 
 use crate::support::files::fbx::{Node, Value, ascii, binary, file, geometry, model, node, text};
 use crate::support::files::mesh::{Gltf, Noise, Solid, read, read_limited};

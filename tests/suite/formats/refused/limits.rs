@@ -1,4 +1,5 @@
-//! Meshes made to cost a lot: refused by a limit, in time, before anything is allocated.
+//! Meshes made to cost a lot: a limit refuses them before their memory is allocated. Polygons that
+//! take too long to triangulate are cut into fans.
 
 use meshsnap_render::import::{Bundle, MeshFault, import};
 use meshsnap_render::limits::{Budget, Deadline, Limits};

@@ -1,4 +1,5 @@
-//! Files that are broken or made to cost a lot, in every format.
+//! Files that are broken or made to cost a lot, in several formats. The folders of the formats have
+//! more.
 
 pub mod bad;
 pub mod costly;

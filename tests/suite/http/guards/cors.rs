@@ -1,4 +1,4 @@
-//! Pages of other origins: what a browser is told.
+//! CORS: what the server tells a browser about pages of other origins.
 
 use crate::support::server::{Answer, CUBE_OBJ, Server, meshsnap};
 

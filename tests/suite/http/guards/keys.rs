@@ -1,4 +1,4 @@
-//! Keys in a file: scopes, owners, SIGHUP, and attempts to do without.
+//! API keys in a file: scopes, owners, SIGHUP, and attempts to get in without a key.
 
 use std::path::Path;
 use std::process::Command;

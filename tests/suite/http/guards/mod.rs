@@ -1,4 +1,5 @@
-//! Strangers at the door: pages that abuse a browser, clients that hold what others need, slips in settings, signals.
+//! Guards of the server: against pages of other sites, clients that hold what others need, forged
+//! signatures and empty keys. Also SIGHUP, and failed jobs in the log.
 
 mod cors;
 mod hang_ups;

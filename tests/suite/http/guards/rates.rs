@@ -1,4 +1,4 @@
-//! How much a client may ask for.
+//! Rate limits and daily quotas: how much a client may ask for.
 
 use std::time::{Duration, Instant};
 

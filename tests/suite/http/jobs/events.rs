@@ -1,4 +1,4 @@
-//! `GET /v1/jobs/{id}/events`: jobs that are followed.
+//! `GET /v1/jobs/{id}/events`: the event stream by which a client follows a job.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;

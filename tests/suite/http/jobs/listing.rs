@@ -1,4 +1,5 @@
-//! `meshsnap jobs`: the jobs of a data folder, whether a server uses it, has ended or was killed.
+//! `meshsnap jobs`: it lists the jobs of a data folder while a server uses it and after that server
+//! was killed, and writes nothing there.
 
 use std::path::Path;
 use std::process::Output;

@@ -1,4 +1,5 @@
-//! The daemon under load and over time: queue, deadline, cancellation, drain.
+//! Jobs of the daemon: queue, deadline, cancellation, drain, and the time for which results are
+//! kept.
 
 pub mod disk;
 pub mod durable;

@@ -1,5 +1,5 @@
-//! Traces that the program sends to a collector of OpenTelemetry. They are there with the feature `otel` alone: `cargo xtask
-//! features` runs these tests with it.
+//! Traces that the server sends to an OpenTelemetry collector. Only builds with the feature `otel`
+//! have them: `cargo xtask features` runs these tests with it.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpListener;

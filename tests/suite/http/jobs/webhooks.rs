@@ -1,4 +1,6 @@
-//! Webhooks: receivers that hear of the ends of jobs.
+//! Webhooks: the server reports the end of a job once, signed, and again after a restart if the
+//! receiver did not take it. Also the certificates that it trusts, and the addresses that it
+//! refuses.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpListener;

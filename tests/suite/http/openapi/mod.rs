@@ -1,4 +1,5 @@
-//! `api/openapi.json` and the routes: what one says, the other does.
+//! Tests that `api/openapi.json` and the server agree, in both directions: each path answers to the
+//! documented methods and to no others, and answers are as documented.
 
 mod stored;
 mod tools;

@@ -1,4 +1,4 @@
-//! Verdicts on meshes over HTTP.
+//! `/v1/check` and `/v1/diff` over HTTP: verdicts on meshes, and differences between them.
 
 mod check;
 mod diff;

@@ -1,5 +1,5 @@
-//! Adaptive samples beside what is transparent: pixels that show nothing of it are drawn from points, as if it were not
-//! there, and all others have 16 samples.
+//! Adaptive samples in pictures with transparent layers: mixed pixels that show no layer are drawn
+//! from points, as if there were no layers. All other pixels have 16 samples.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::{CpuRenderer, Isa};

@@ -1,5 +1,5 @@
-//! The pixels that an edge between two faces makes mixed: by how much the faces' normals differ, and by where the edge
-//! lies between the samples.
+//! Which pixels an edge between two faces makes mixed: by the angle between the faces' normals, and
+//! by the place of the edge between the samples.
 
 use meshsnap_render::limits::Deadline;
 use meshsnap_render::plan::{DrawPlan, ShadedMaterial, flags};

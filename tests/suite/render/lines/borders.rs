@@ -1,5 +1,5 @@
-//! Lines at the picture's border where the mesh goes on beyond it: those of the same pixels in the
-//! middle of a larger picture.
+//! Lines at the picture's border, where the mesh goes on beyond it: their pixels are those of the
+//! same place in the middle of a larger picture.
 
 use std::sync::Arc;
 

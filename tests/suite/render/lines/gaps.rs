@@ -1,5 +1,5 @@
-//! Short gaps between faces that hide a line: a thin face that no sample sees hides it too, and a slit
-//! shows it.
+//! Lines behind faces with a short gap between them: a thin face in the gap hides the lines even if
+//! no sample sees it, and an open slit shows them.
 
 use std::sync::Arc;
 

@@ -1,5 +1,6 @@
-//! Lines whose coverage holes in faces tell: against the same lines as strokes alone, on both
-//! back-ends. What the lines should be is the accuracy suite's to say.
+//! Holes: the areas of faces that lines leave free, from which most pixels get their coverage where
+//! all edges are lines. They give the same lines as strokes alone, on both back-ends. What the
+//! lines should be, the accuracy suite tests.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::CpuRenderer;

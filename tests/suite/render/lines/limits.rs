@@ -1,5 +1,5 @@
-//! Limits of lines: memory and loop steps are bounded, whatever a request says; and numbers that
-//! are not finite.
+//! Limits of lines: the widest lines on the largest picture take bounded memory, and both back-ends
+//! agree on very many hidden parts, very many strokes, and positions that are not finite.
 
 use std::fmt::Write as _;
 use std::sync::Arc;

@@ -1,4 +1,6 @@
-//! The lines that are drawn, in every combination of keys, on both back-ends.
+//! Lines in combinations of edge class, hidden mode, contour and light, alike on both back-ends
+//! (half of the combinations; all of them in a long run). Also single looks, each against the
+//! picture that it should equal.
 
 use std::sync::Arc;
 

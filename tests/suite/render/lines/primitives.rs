@@ -1,5 +1,5 @@
-//! Lines and points without area are drawn, as wide as they are said to be, and nothing else
-//! changes because of them.
+//! Line and point primitives, which have no area: they are drawn as wide as documented, and nothing
+//! else changes because of them.
 
 use std::sync::Arc;
 

@@ -1,8 +1,10 @@
-//! What strikes at first sight: wires that hide the surface, and surfaces without form because light bleaches
-//! them. Every mesh, in the looks that it has when nothing is asked for.
+//! Measures what a viewer sees at once: wires that hide the surface of a small picture, surfaces
+//! bleached by light, and forms that are hard to tell. Each real mesh is drawn in the default
+//! style, and with wires at 128 px.
 //!
-//! `cargo test --test suite -- first_sight outlines_specks --nocapture` prints the figures of each mesh, and the
-//! RMS of luminance minus its mean over 9 x 9 pixels: how clearly a picture shows small forms.
+//! `cargo test --test suite -- first_sight outlines_specks --nocapture` prints the figures of each
+//! mesh. Local contrast is the RMS of luminance minus its mean over 9 x 9 pixels: how clearly a
+//! picture shows small forms.
 
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 

@@ -1,4 +1,4 @@
-//! What a request adds around the surface, and how it shows it.
+//! How pictures look by default; and backgrounds, the ground's shadow and the style `xray`.
 
 pub mod backgrounds;
 pub mod defaults;

@@ -1,5 +1,5 @@
-//! `surface.facing_opacity` and the style `xray`: alpha is the formula's of the angle between normal and
-//! ray, in every shading and projection, and the back-ends agree.
+//! `surface.facing_opacity` and the style `xray`: alpha follows the formula of the angle between
+//! normal and ray, in every shading and projection, and the back-ends agree.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::{CpuRenderer, Isa};

@@ -1,5 +1,6 @@
-//! Hulls never show through closed surfaces. The truth is found by rays: a pixel may have the
-//! outline's colour only if a silhouette edge is visible within the outline's reach.
+//! Hulls (outline meshes) never show through closed surfaces. The truth tests points of the
+//! silhouette edges against every face: a pixel may have the outline's colour only if a visible
+//! point is within the outline's width.
 
 use std::collections::HashMap;
 

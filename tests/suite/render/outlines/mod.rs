@@ -1,4 +1,4 @@
-//! What outlines leave out: crumbs, and what closed surfaces hide.
+//! What outlines leave out: specks, and what closed surfaces hide.
 
 mod closed;
 mod specks;

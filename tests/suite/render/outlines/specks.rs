@@ -1,7 +1,8 @@
-//! Specks: isolated crumbs of an outline inside a shape. Every mesh, in the default outline and as a
-//! contour.
+//! Specks: small isolated pieces of an outline inside a shape. Every real mesh has few of them, as
+//! a hull and as a contour.
 //!
-//! `cargo test --test suite -- first_sight outlines_specks --nocapture` prints the number of each mesh.
+//! `cargo test --test suite -- first_sight outlines_specks --nocapture` prints the number of each
+//! mesh.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::CpuRenderer;

@@ -1,5 +1,5 @@
-//! Images that are broken, huge or slow to decode: refused in words, before anything is paid for
-//! them.
+//! Images that are broken or huge. A broken image is a warning that names it. A huge one is refused
+//! by its header, before memory is allocated for its pixels. Chunks beside the pixels cost nothing.
 
 use crate::support::work::within_bytes;
 use image::ImageFormat;

@@ -1,4 +1,5 @@
-//! Levels of textures that are left out: none that a pixel could reach, and as many as can be.
+//! The fine levels of textures that the plan leaves out: no pixel could sample them, and as many
+//! are left out as that allows.
 
 use crate::render::textures::levels::{base, encode, model, model_of};
 use crate::support::files::mesh::Noise;

@@ -1,4 +1,5 @@
-//! Cut-out textures seen from afar: as much is drawn as close up.
+//! Cut-out textures (alpha masks) seen from afar: they cover the same share of the picture as close
+//! up.
 
 use image::{DynamicImage, ImageFormat, Rgba, RgbaImage};
 use meshsnap_render::backend::Renderer as _;

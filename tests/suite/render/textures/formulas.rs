@@ -1,4 +1,5 @@
-//! Textures on a square that faces the viewer: what is where, which way up, and which way bumps go.
+//! Textures on a square that faces the viewer: the place of each texel, the blend between levels,
+//! and the direction in which bumps lean.
 
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::CpuRenderer;

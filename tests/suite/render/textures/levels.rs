@@ -1,4 +1,5 @@
-//! Images to textures: every kind of pixel and every level.
+//! From images to textures: every pixel format and every level, against definitions in f64. Also
+//! the helpers with which the other tests of textures make their models.
 
 use std::io::Cursor;
 

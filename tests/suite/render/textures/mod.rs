@@ -1,4 +1,4 @@
-//! Textures.
+//! Textures: images decoded into levels, and how pictures show them.
 
 pub mod bad;
 pub mod basis;

@@ -1,5 +1,6 @@
-//! Flat faces, GPU against CPU: the light of a whole face may lie on a byte's threshold, so both
-//! compute the same bits.
+//! Flat faces, GPU against CPU, byte for byte. A whole face has one colour: if that lies on a
+//! byte's threshold, the smallest difference would change every pixel of the face. Hardware may
+//! differ in 8 pixels per picture.
 
 use std::collections::HashSet;
 

@@ -1,4 +1,5 @@
-//! Every look of the shade stage, GPU against CPU.
+//! Every look of the shade stage (normals, metals, textures, wires, debug views), GPU against CPU.
+//! On the CPU also points that are shaded together against one by one.
 
 use std::borrow::Cow;
 

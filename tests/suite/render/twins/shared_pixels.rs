@@ -1,4 +1,5 @@
-//! Pictures lie in memory that the GPU has written, until their last reader is done.
+//! Pictures stay in the memory that the GPU has written, until their last reader drops them. No
+//! other job overwrites them meanwhile, and their memory is reused or freed afterwards.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Scenes whose lines are measured.
+//! Meshes and views whose lines the accuracy tests measure, with the errors that are allowed.
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,5 @@
-//! Random triangles to disagree about, and how they are looked at.
+//! Triangle soups: random triangles of several kinds, to compare back-ends on, and random views of
+//! them.
 
 use meshsnap_render::plan::{DrawPlan, Faces, HullPass, Projection, ScreenVertex, ShadedMaterial, SurfacePass};
 

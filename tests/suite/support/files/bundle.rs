@@ -1,4 +1,5 @@
-//! Several files that belong together.
+//! Bundles of several files, honest archives, and the models of `tests/data` that consist of
+//! several files.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use crate::support::files::mesh::Read;

@@ -1,5 +1,5 @@
-//! Small mesh files of every format, made from one description, so that tests can compare what
-//! comes out.
+//! Small mesh files (OBJ, STL, glTF), made from one description, so that tests can compare what
+//! comes out. Also imports with default limits.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use meshsnap_render::import::{Bundle, Format, ImportReport, MeshError, Options, import};

@@ -1,4 +1,4 @@
-//! Mesh files of every format: made from one description, packed, damaged, or built to be costly.
+//! Mesh files of many formats: made from one description, packed, damaged, or built to be costly.
 
 pub mod archive;
 pub mod bombs;

@@ -1,4 +1,4 @@
-//! Meshes compared.
+//! Compares two meshes in everything that must not depend on the format of their files.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use meshsnap_render::limits::{Budget, Limits};

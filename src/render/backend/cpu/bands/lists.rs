@@ -2,7 +2,8 @@
 //! draws at a time.
 //!
 //! The lists of all bands lie one after the other in one array, which a counting sort fills.
-//! Triangles that touch many bands are in a list of their own, which every band filters.
+//! Triangles that touch many bands are in a list of their own, which every band filters: otherwise
+//! large ones would take too much memory on a tall picture.
 
 use std::ops::Range;
 

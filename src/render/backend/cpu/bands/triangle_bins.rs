@@ -1,9 +1,11 @@
-//! The triangles that touch each band, before the stage visibility. A band is a range of pixel rows that one thread
-//! draws at a time.
+//! The triangles that touch each band, before the stage visibility. A band is a range of pixel rows
+//! that one thread draws at a time. A [`TriangleBin`] has those of one chunk of the triangles, so
+//! that several threads can sort them.
 //!
-//! There are separate lists of triangles that face the viewer, that face away, and that are thin, and of the pieces
-//! that are left of triangles after clipping. Later stages treat these differently. The mesh's triangles are taken in
-//! chunks, so that several threads can sort them.
+//! There are separate lists of triangles that face the viewer, that face away, and that are thin,
+//! and of the pieces that are left of triangles after clipping. The stage visibility draws those
+//! that face away last, because most of them are hidden by then. The stage mixed looks for the thin
+//! ones, which samples may miss.
 
 use std::ops::Range;
 

@@ -1,5 +1,6 @@
-//! Clipping of triangles and edges that reach behind the eye or far outside the picture (stage transform): it cuts
-//! off what cannot be drawn. Twin of `shaders/geometry/clip.wgsl`.
+//! Clipping of triangles (before the stage visibility) and of edges (in the stage lines) that reach
+//! behind the eye or far outside the picture: it cuts off what cannot be drawn. Twin of
+//! `shaders/geometry/clip.wgsl`.
 
 use super::transform::{ScreenVertex, recip, round_to_i32};
 use crate::plan::Projection;

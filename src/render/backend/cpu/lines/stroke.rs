@@ -1,10 +1,11 @@
-//! The part of a pixel that a stroke covers, as an area and as a mask of points (stage lines). Twin of
-//! `shaders/lines/stroke.wgsl`.
+//! The part of a pixel that a stroke covers, as an area and as a mask of points (stage lines). Twin
+//! of `shaders/lines/stroke.wgsl`.
 //!
-//! A stroke is all that lies within half the line's width of a piece of an edge. Where only its two long sides
-//! cross the pixel, its area follows from a formula for strips (`profile`). The mask tells which of the pixel's
-//! [`POINTS`] points, a rank-1 lattice, the stroke covers. It is found in integers, so that both back-ends agree to
-//! the bit. [`coverage`](super::coverage) needs the mask to unite strokes that overlap.
+//! A stroke is all that lies within half the line's width of a piece of an edge. Where only its two
+//! long sides cross the pixel, its area follows from a formula for strips (`profile`). Elsewhere
+//! the number of covered points gives its area. The mask tells which of the pixel's [`POINTS`]
+//! points, a rank-1 lattice, the stroke covers. It is found in integers, so that both back-ends
+//! agree to the bit. [`coverage`](super::coverage) needs the mask to unite strokes that overlap.
 
 use super::profile::Profile;
 use crate::backend::cpu::geometry::transform::{round_to_i32, rsqrt};

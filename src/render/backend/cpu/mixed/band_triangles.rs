@@ -1,6 +1,6 @@
-//! The triangles of a band (a range of pixel rows) in the order in which mixed pixels test them: clipped pieces, then
-//! triangles that face the viewer, then those that face away (stage mixed). Mixed pixels are drawn a second time,
-//! from 64 or 256 points each.
+//! The triangles of a band (a range of pixel rows) in the order in which mixed pixels test them:
+//! clipped pieces, then triangles that face the viewer, then those that face away, which are mostly
+//! hidden by then (stage mixed). Mixed pixels are drawn a second time, from 64 or 256 points each.
 
 use std::borrow::Cow;
 use std::ops::ControlFlow;

@@ -1,8 +1,10 @@
-//! The nearest triangle at each point of a mixed pixel, kept as one depth and one id per point (stage mixed). Mixed
-//! pixels are drawn a second time, from 64 or 256 points each, because faces of different colours meet there.
+//! The nearest triangle at each point of a mixed pixel, kept as one depth and one id per point
+//! (stage mixed). Mixed pixels are drawn a second time, from 64 or 256 points each, because faces
+//! of different colours meet there.
 //!
-//! This serves pixels that show more faces than [`faces`](super::faces) has room for or have more triangles than a
-//! list holds, and tests.
+//! This serves pixels that show more faces than [`faces`](super::faces) has room for or have more
+//! triangles than a list holds. The renderer without shortcuts, with which tests compare, uses it
+//! for all mixed pixels.
 
 use super::points::{Lattice, PointSet};
 use super::shares::{Share, Shares};

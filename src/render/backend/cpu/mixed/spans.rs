@@ -1,6 +1,6 @@
-//! The columns of pixels that a triangle may touch in a row of pixels (stage mixed). For a large slanted triangle
-//! these are about half of the pixels of its bounding box or fewer, so that fewer of the pixels that are drawn a
-//! second time have to test it.
+//! The columns of pixels that a triangle may touch in a row of pixels (stage mixed). For a large
+//! slanted triangle these are about half of the pixels of its bounding box or fewer. So fewer of
+//! the mixed pixels, which are drawn a second time from many points, have to test it.
 
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 

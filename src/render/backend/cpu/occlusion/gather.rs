@@ -1,6 +1,8 @@
-//! The light that surfaces around a pixel block, for the pixels of every second column and row (stage occlusion,
-//! screen-space ambient occlusion). Surfaces are looked up at 16 fixed offsets from the pixel. How much light each
-//! of them blocks follows from its position in space. Twin of `shaders/occlusion/gather.wgsl`.
+//! How much light is blocked by the surfaces around a pixel (stage occlusion, screen-space ambient
+//! occlusion). This is computed for the pixels of every second column and row; `spread` fills in
+//! the others. A pixel looks at 16 places around it. They are one of four sets, and neighbours look
+//! at different sets. How much the surface at a place blocks follows from its position in space.
+//! Twin of `shaders/occlusion/gather.wgsl`.
 
 use super::grid::{Grid, NOWHERE, PHASES, lanes};
 use crate::backend::cpu::geometry::transform::{quick_rsqrt, round_to_i32};

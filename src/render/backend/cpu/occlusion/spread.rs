@@ -1,6 +1,7 @@
-//! The smoothing of the darkness of hollows, by a weighted mean over the neighbours that show the same surface
-//! (stage occlusion, screen-space ambient occlusion). It also gives a value to the pixels between those that
-//! `gather` looks at. Twin of `shaders/occlusion/spread.wgsl`.
+//! The smoothing of the darkness of hollows, by a weighted mean over the neighbours that show the
+//! same surface (stage occlusion, screen-space ambient occlusion). Neighbours looked at different
+//! places in `gather`, so their values differ even on a smooth surface. The mean also gives a value
+//! to the pixels between those that `gather` computes. Twin of `shaders/occlusion/spread.wgsl`.
 
 use super::grid::{Grid, NOWHERE, PHASES, lanes};
 use crate::backend::cpu::geometry::transform::round_to_i32;

@@ -1,10 +1,10 @@
-//! The compositing of the transparent layers of each sample, front to back, and then of the surface under them (stage
-//! shade). Twin of `shaders/peeling/composite.wgsl`.
+//! The compositing of the transparent layers of each sample, front to back, and then of the surface
+//! under them (stage shade). Twin of `shaders/peeling/composite.wgsl`.
 //!
-//! Layers are found by depth peeling (Everitt 2001, "Interactive order-independent transparency"), for each sample by
-//! itself. Depth and triangle id make a word that is greater for what is nearer, and of equal depths for the lower
-//! id. A round finds the greatest word below the last round's. All words are above that of the opaque surface in the
-//! visibility buffer, unless wires show through the surface.
+//! Layers are found by depth peeling (Everitt 2001, "Interactive order-independent transparency"),
+//! for each sample by itself. [`draw`] runs the rounds. Each round finds the nearest triangle
+//! behind the last round's; of equal depths, the lower triangle id counts as nearer. All layers are
+//! in front of the opaque surface in the visibility buffer, unless wires show through the surface.
 
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::context::RasterContext;

@@ -1,9 +1,11 @@
-//! The tints that lines take from the transparent layers in front of them: what each layer adds to a pixel, and its
-//! depth there (stage shade). Twin of `shaders/peeling/tints.wgsl`.
+//! The tints that lines take from the transparent layers in front of them: what each layer adds to
+//! a pixel, and its depth there (stage shade). From the fourth layer on, all count as one. Twin of
+//! `shaders/peeling/tints.wgsl`.
 //!
-//! The depth of a layer is known at samples, which may lie beside the line. So a layer counts as in front of a line
-//! only if it would still be nearer after a step of the length [`tint_reach`](crate::plan::LinePass::tint_reach)
-//! down its slope, away from the viewer. Otherwise a line would count as behind the very faces whose edge it is.
+//! The depth of a layer is known at samples, which may lie beside the line. So a layer counts as in
+//! front of a line only if it would still be nearer after a step of the length
+//! [`tint_reach`](crate::plan::LinePass::tint_reach) down its slope, away from the viewer.
+//! Otherwise a line would count as behind the very faces whose edge it is.
 
 use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::steepness::{NEARER_RATIO, steepness_of};

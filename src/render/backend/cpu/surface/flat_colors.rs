@@ -1,4 +1,5 @@
-//! The table of the colours of triangles that have one colour all over, by triangle id. `flat` fills and uses it.
+//! The table of the colours of triangles that have one colour all over, by triangle id. `flat`
+//! fills it. `flat` and the stage mixed look colours up in it.
 
 /// Marks a colour that is computed per pixel: the triangle is clipped, or its colour is not finite
 /// (infinity times a weight of 0 is not 0).

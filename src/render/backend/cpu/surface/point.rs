@@ -1,5 +1,6 @@
-//! The colours of points of the surface, from material, textures, light and wires (stage shade). One point is shaded
-//! at a time, or eight. Twin of `shaders/surface/point.wgsl`.
+//! The colours of points of the surface, from material, textures, light and wires (stage shade).
+//! One point is shaded at a time for `shade`, eight for `waiting`. Twin of
+//! `shaders/surface/point.wgsl`.
 
 use super::barycentric::{Barycentrics, Corners};
 use super::debug;

@@ -1,9 +1,10 @@
-//! The search for the points to be shaded in eight pixels of a row at a time (stage shade). For each triangle that a
-//! pixel's samples show, there is one point at their mean position, with the triangle's share of the pixel. Points
-//! [wait](super::waiting) until many are shaded together.
+//! The search for the points to be shaded in eight pixels of a row at a time (stage shade). For
+//! each triangle that a pixel's samples show, there is one point at their mean position, with the
+//! triangle's share of the pixel. Points [wait](super::waiting) until many are shaded together.
 //!
-//! In each pixel the colours of its triangles are summed up in the order of its samples, as in [`Shader::pixel`],
-//! so that both round alike.
+//! In each pixel the colours of its triangles are summed up in the order of its samples.
+//! [`Shader::pixel`], which shades pixels that show an outline, sums them up in the same order, so
+//! both ways give the same bits.
 
 use super::shade::{Shader, for_each_quarter, for_each_triangle};
 use super::waiting::{Point, Waiting};

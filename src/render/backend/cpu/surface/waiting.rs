@@ -1,5 +1,6 @@
-//! The points of a band (a range of pixel rows) that wait to be shaded (stage shade). When there are 32 of one
-//! material, or the next point has another, they are shaded together and added to their pixels.
+//! The points of a band (a range of pixel rows) that wait to be shaded, and their shading (stage
+//! shade). When there are 32 of one material, or the next point has another material, they are
+//! shaded eight at a time and added to their pixels.
 
 use super::barycentric::{Barycentrics, Corners};
 use super::point::{Points, Show, is_smooth};

@@ -1,5 +1,7 @@
-//! A file on disk with the compiled pipelines of one kind of GPU, in the driver's own form. The next process loads
-//! it, so that the driver need not compile these pipelines again. A checksum shows whether the file is damaged.
+//! A file on disk with the compiled pipelines of one kind of GPU, in the driver's own form. It is
+//! read when the GPU is opened, so that the driver need not compile the pipelines of an earlier
+//! process again, and written when new ones were made. A checksum shows whether the file is
+//! damaged.
 
 #![allow(unsafe_code)]
 

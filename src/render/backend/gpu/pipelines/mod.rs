@@ -1,7 +1,7 @@
-//! The compute pipelines of a GPU: kernels (compute shaders) compiled for the features that a picture has. A pipeline
-//! is made when a picture first needs it, and kept for those that follow.
+//! The compute pipelines of a GPU: kernels (compute shaders) compiled for the features that a
+//! picture has. A pipeline is made when a picture first needs it, and kept for those that follow.
 //!
-//! Also the list of all kernels, and that of the buffers, whose order gives their binding numbers.
+//! Also the list of all kernels, and that of the buffers with their binding numbers.
 
 pub(crate) mod file;
 pub(crate) mod kernels;

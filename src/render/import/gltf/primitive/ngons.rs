@@ -1,6 +1,6 @@
-//! The reader of FB_ngon_encoding, in which the order of triangles tells which consecutive ones
-//! form a polygon. The edges between triangles of one polygon are marked as diagonals, so that a
-//! drawing of the edges leaves them out.
+//! The reader of the glTF extension FB_ngon_encoding, in which the order of triangles tells which
+//! consecutive ones form a polygon. The edges between triangles of one polygon are marked as
+//! diagonals, so that a drawing of the edges leaves them out.
 //! <https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Vendor/FB_ngon_encoding>
 
 use crate::import::polygon::ALL_EDGES;

@@ -1,4 +1,6 @@
-//! EXT_mesh_gpu_instancing: one node that shows its mesh many times.
+//! The transforms of a node's instances, read from EXT_mesh_gpu_instancing: one node shows its mesh
+//! many times. The triangles of all instances are checked against the limit before a transform is
+//! read.
 //! <https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Vendor/EXT_mesh_gpu_instancing>
 
 use super::transform::Trs;

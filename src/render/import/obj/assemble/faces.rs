@@ -1,5 +1,7 @@
 //! The triangles, line segments and points of an OBJ mesh. Polygons of four and more corners are
-//! split into triangles, by several threads unless that takes very much work.
+//! split into triangles by several threads. If that takes more work than a file may (`WORK_MAX`),
+//! one thread does it again. Otherwise the order of the threads would decide for which polygons the
+//! work suffices.
 
 use super::Names;
 use crate::import::MeshError;

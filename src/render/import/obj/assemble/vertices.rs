@@ -1,7 +1,9 @@
 //! The vertices of an OBJ mesh. A corner of an OBJ face has separate indices of a position, a
-//! texture coordinate and a normal, and each combination of them becomes a vertex. Where corners
-//! have positions alone, the file's lists are taken as they are, and mostly also where the indices
-//! of each corner are equal.
+//! texture coordinate and a normal. Each combination of them becomes a vertex, anew in each run of
+//! faces with one material and one form of corner.
+//!
+//! The file's lists are taken as they are where corners have positions alone, and where all corners
+//! have equal indices and no value is broken (`uses_of_vertices`).
 
 use super::{Names, Room};
 use crate::import::MeshError;

@@ -1,8 +1,9 @@
 //! The general parsing of OBJ: any line, word by word. Lines in their most frequent form are parsed
 //! faster elsewhere (`numbers`, `corners`).
 //!
-//! Harmless content is dropped or completed: names that are not UTF-8, faces of fewer than three
-//! corners, colours that only some vertices have.
+//! Harmless faults are no errors. Names that are not UTF-8 are kept as bytes. Faces of fewer than
+//! three corners are counted and left out. If only some vertices have colours, the first vertex
+//! decides: all get one (white where a vertex has none), or none does.
 
 use super::numbers::{opaque, upright};
 use super::{CORNERS_PER_POLL, Parser, PartError};

@@ -1,5 +1,6 @@
-//! Tests of the search for silhouette edges: edges inside a surface are left out early, and runs of faces
-//! that are tested as a whole give what their faces would give one by one.
+//! Tests of the search for silhouette edges: edges inside a surface are left out early, and runs of
+//! faces (32 consecutive ones) that are tested as a whole give what their faces would give one by
+//! one.
 
 use super::*;
 use crate::import::{Bundle, import};

@@ -1,9 +1,11 @@
-//! The parts of silhouette edges that no face hides, beside which an outline is drawn. For each part it
-//! is also found how much of the outline's width is visible, and whether the background is beside it.
+//! The parts of silhouette edges that no face hides, beside which an outline is drawn. For each
+//! part it is also found how much of the outline's width is visible, and whether the background is
+//! beside it. Where there are too many pairs of edges and faces to compare, all parts count as
+//! visible.
 //!
-//! Depths alone cannot tell that an edge is hidden. An outline is wider than the edge that it belongs to,
-//! and a face in front of the edge may recede faster than the outline does, so that the outline would
-//! show in front of that face.
+//! The depth test of the back-ends alone does not hide an outline. An outline is wider than the
+//! edge that it belongs to, and a face in front of the edge may recede faster than the outline
+//! does. There the outline would show in front of that face.
 
 mod cells;
 mod grid;

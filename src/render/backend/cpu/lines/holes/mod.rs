@@ -17,11 +17,13 @@
 //! In the other marked pixels all edges are drawn one by one, as strokes (a stroke is the area within half a line's
 //! width of an edge):
 //!
-//! - a sample of the pixel shows the outline mesh, or a sample in or next to it shows a clipped face;
+//! - a sample of the pixel shows the outline mesh, or a sample in or next to it shows a clipped
+//!   face (no insets are computed for these);
 //! - a [tip](tips) is close, which is a visible corner whose face no sample of its pixel shows;
 //! - a face that counts in the pixel is partly hidden by a face that it intersects nearby.
 //!
-//! With one sample per pixel, all marked pixels get strokes.
+//! With one sample per pixel, all marked pixels get strokes: a rim that no sample shows may
+//! count as hidden, and the strokes of the edges beside it make up for it.
 //!
 //! A face counts in a pixel if a sample of the pixel, or of one of the eight pixels around it, shows the face. No
 //! face is missed that way: each point of a visible inset is the centre of a disc that shows the face and is as wide

@@ -1,6 +1,6 @@
-//! The mixed pixels of a band (a range of pixel rows), as a list row by row and as a bit mask (stage mixed). Mixed
-//! pixels are drawn a second time, from 64 or 256 points each. The mask gives the list's indices of the pixels in a
-//! range of columns.
+//! The mixed pixels of a band (a range of pixel rows), as a list row by row and as a bit mask
+//! (stage mixed). Mixed pixels are drawn a second time, from 64 or 256 points each. By the mask,
+//! the part of the list is found that lies in a range of columns of a row.
 
 use std::ops::Range;
 

@@ -1,8 +1,9 @@
-//! The search for pixels with triangles so thin that samples miss them, such as hairs and slivers (stage mixed). Such
-//! pixels are marked as mixed: they are drawn a second time, from more points.
+//! The search for pixels with triangles so thin that samples miss them, such as hairs and slivers
+//! (stage mixed). Such pixels are marked as mixed: they are drawn a second time, from more points.
 //!
-//! A thin triangle is followed along its longer side. A pixel that it touches is marked if a sample shows something
-//! behind the triangle whose colour differs from the triangle's. Neighbours of these pixels are not marked.
+//! A thin triangle is followed along its longer side. A pixel that it touches is marked if no
+//! sample shows the triangle, and a sample shows something behind it whose colour differs from the
+//! triangle's. Neighbours of these pixels are not marked.
 
 use super::breaks;
 use super::pairs::Pairs;

@@ -1,6 +1,7 @@
-//! Tests of a mixed pixel's points in AVX2 instructions, eight points at a time: whether they lie outside an edge of
-//! a triangle, and whether one triangle is nearer there than another (stage mixed). Mixed pixels are drawn a second
-//! time, from 64 or 256 points each.
+//! AVX2 versions of two functions of the parent module (stage mixed): whether the points of a mixed
+//! pixel lie outside an edge of a triangle, and whether one triangle is nearer than another at
+//! them. Eight points are tested at a time. Mixed pixels are drawn a second time, from 64 or 256
+//! points each.
 
 use std::arch::x86_64::*;
 

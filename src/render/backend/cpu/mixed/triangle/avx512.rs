@@ -1,5 +1,6 @@
-//! The test whether a mixed pixel's points lie outside an edge of a triangle, in AVX-512 instructions, sixteen points
-//! at a time (stage mixed). Mixed pixels are drawn a second time, from 64 or 256 points each.
+//! The AVX-512 version of a function of the parent module (stage mixed): whether the points of a
+//! mixed pixel lie outside an edge of a triangle. Sixteen points are tested at a time. Mixed pixels
+//! are drawn a second time, from 64 or 256 points each.
 
 #![allow(unsafe_code)]
 

@@ -1,6 +1,7 @@
-//! The search for the pixels of a row that show more than one face: in their own samples, or in the closest samples
-//! of the pixels on the left and above (stage mixed). Only there can faces of different colours meet, so that
-//! pixels have to be drawn a second time, from more points.
+//! The search for the pixels of a row that show more than one face: in their own samples, or in the
+//! closest samples of the pixels on the left and above (stage mixed). Only there can faces of
+//! different colours meet. Pixels where they do are drawn a second time, from more points. This
+//! search is for pictures with four samples per pixel.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
