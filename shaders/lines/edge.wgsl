@@ -101,11 +101,9 @@ fn edge(
     @builtin(local_invocation_index) thread: u32,
 ) {
     let group = workgroup.x + workgroup.y * groups.x;
-    let first = batch.first + group * batch.edges_per_group;
-    let i = group * batch.edges_per_group + thread;
     var shares = 0u;
-    if thread < batch.edges_per_group && i < batch.count {
-        shares = shares_of(edges[batch.first + i]);
+    if has_edge(group, thread) {
+        shares = shares_of(edge_of(group, thread));
     }
     share_ends[thread] = shares;
     if thread == 0u {
@@ -123,7 +121,26 @@ fn edge(
         share_ends[thread] += before;
         workgroupBarrier();
     }
-    draw_shares(first, group, thread);
+    draw_shares(group, thread);
+}
+
+// The number of a workgroup's edge in the dispatch. Neighbouring edges, which often are long or silhouettes together,
+// go to different workgroups, so that all have about as much to draw.
+fn edge_number(group: u32, slot: u32) -> u32 {
+    return group + slot * groups_with_edges();
+}
+
+// A dispatch may have more workgroups, which have no edges.
+fn groups_with_edges() -> u32 {
+    return (batch.count + batch.edges_per_group - 1u) / batch.edges_per_group;
+}
+
+fn has_edge(group: u32, slot: u32) -> bool {
+    return slot < batch.edges_per_group && group < groups_with_edges() && edge_number(group, slot) < batch.count;
+}
+
+fn edge_of(group: u32, slot: u32) -> vec4<u32> {
+    return edges[batch.first + edge_number(group, slot)];
 }
 
 fn shares_of(edge: vec4<u32>) -> u32 {
@@ -142,8 +159,8 @@ fn shares_of(edge: vec4<u32>) -> u32 {
     return window_count(s) * batch.line_slices;
 }
 
-// Draws the shares of the workgroup, whose edges begin at `first`, from where it paused.
-fn draw_shares(first: u32, group: u32, thread: u32) {
+// Draws the shares of the workgroup, from where it paused.
+fn draw_shares(group: u32, thread: u32) {
     let all = share_ends[LINE_THREADS - 1u];
     let may_pause = batch.line_units != NO_LIMIT;
     units_left = batch.line_units;
@@ -159,7 +176,7 @@ fn draw_shares(first: u32, group: u32, thread: u32) {
     while next < all && units_left > 0u {
         let base = next - next % LINE_THREADS;
         let own = base + thread;
-        if own >= next && own < all && is_due(first, own) {
+        if own >= next && own < all && is_due(group, own) {
             atomicOr(&due, 1u << thread);
         }
         units_left--;
@@ -175,7 +192,7 @@ fn draw_shares(first: u32, group: u32, thread: u32) {
                 next = share;
                 break;
             }
-            drawn_to = draw_share(first, share, drawn_to, thread);
+            drawn_to = draw_share(group, share, drawn_to, thread);
             if drawn_to.x < BEYOND {
                 next = share;
                 break;
@@ -210,9 +227,9 @@ fn first_share_of(slot: u32) -> u32 {
 }
 
 // True if a share may have something to draw.
-fn is_due(first: u32, share: u32) -> bool {
+fn is_due(group: u32, share: u32) -> bool {
     let slot = edge_of_share(share);
-    let s = segment_of(edges[first + slot]);
+    let s = segment_of(edge_of(group, slot));
     let window = window_of(s, share - first_share_of(slot));
     return window.first <= window.rows.y && gets_strokes(s, window);
 }
@@ -221,9 +238,9 @@ fn is_due(first: u32, share: u32) -> bool {
 //
 // One loop for all steps, because compilers copy what is called into each place that calls it, and
 // here that is most of the kernel.
-fn draw_share(first: u32, share: u32, drawn_to: vec2<f32>, thread: u32) -> vec2<f32> {
+fn draw_share(group: u32, share: u32, drawn_to: vec2<f32>, thread: u32) -> vec2<f32> {
     let slot = edge_of_share(share);
-    let edge = edges[first + slot];
+    let edge = edge_of(group, slot);
     let s = segment_of(edge);
     let window = window_of(s, share - first_share_of(slot));
     let range = widened(s, window.range);
