@@ -89,7 +89,7 @@ fn every_scene_has_a_test_and_every_picture_a_scene() {
     let stored: BTreeSet<String> =
         entries.map(|entry| entry.unwrap().path().file_stem().unwrap().to_str().unwrap().to_owned()).collect();
     assert_eq!(scenes, stored, "tests/golden");
-    assert_eq!(SCENES.len(), 41);
+    assert_eq!(SCENES.len(), 42);
     let compared = SCENES.len() * 2 * THREADS.len() * RUNS;
     goal(7, &format!("identical: {compared} pictures with {:?} instructions on {THREADS:?} threads", isas()));
 }

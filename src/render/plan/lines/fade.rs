@@ -120,6 +120,8 @@ impl Density {
     /// Adds what the line along an edge covers, given its ends in pixels from the picture's upper left corner and the
     /// line's width in pixels.
     pub fn add_edge(&mut self, ends: [[f64; 2]; 2], width_px: f64) {
+        // The end that the file names first must not matter.
+        let ends = if ends[0] <= ends[1] { ends } else { [ends[1], ends[0]] };
         let Some([a, b]) = clipped(ends, self.size_px.map(f64::from)) else { return };
         let length = ((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1])).sqrt();
         let parts = (length / f64::from(self.spacing_px)).ceil().max(1.0);

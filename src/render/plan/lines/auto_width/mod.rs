@@ -141,6 +141,18 @@ fn diameter_of(class: usize) -> f64 {
     f64::from_bits(((leading as u64) << (52 - MANTISSA_BITS)) | 1 << (51 - MANTISSA_BITS))
 }
 
+/// Units of a face's corners on screen in a pixel.
+const UNITS: f64 = 4096.0;
+
+/// Corners are taken to lie at most this far from the picture's middle, in units: products of two distances fit 64
+/// bits.
+const FARTHEST: f64 = (1_u64 << 29) as f64;
+
+/// A distance in whole units, given in pixels.
+fn in_units(distance_px: f64) -> i64 {
+    (distance_px * UNITS).round().clamp(-FARTHEST, FARTHEST) as i64
+}
+
 /// A face as it is seen, pixels.
 struct FaceOnScreen {
     /// From the middle of the picture.
@@ -166,17 +178,21 @@ impl<'a> View<'a> {
         Self { mesh: scene.mesh, projector, half_px, are_polygons }
     }
 
-    /// A face on screen; None with a corner behind the near plane, or without an area.
+    /// A face on screen; None with a corner behind the near plane, or without an area. Its corners are rounded and
+    /// sums are those of whole numbers, so that nothing depends on the corner that a file names first.
     fn face(&self, face: usize) -> Option<FaceOnScreen> {
         let [a, b, c] = self.mesh.triangles[face].map(|v| self.place_of(v));
-        let corners = [a?, b?, c?];
+        let corners = [a?, b?, c?].map(|corner| corner.map(in_units));
         let ways = [0, 1, 2].map(|k| [0, 1].map(|axis| corners[(k + 1) % 3][axis] - corners[k][axis]));
+        let twice = (ways[0][0] * ways[1][1] - ways[0][1] * ways[1][0]).unsigned_abs();
         // A face may be far larger than the picture.
         let picture = 4.0 * self.half_px[0] * self.half_px[1];
-        let area = (0.5 * (ways[0][0] * ways[1][1] - ways[0][1] * ways[1][0]).abs()).min(picture);
+        let area = (0.5 * twice as f64 / (UNITS * UNITS)).min(picture);
         let mask = if self.are_polygons { self.mesh.edge_masks.get(face).copied().unwrap_or(7) } else { 7 };
         let drawn = (0..3).filter(|k| mask >> k & 1 == 1);
-        let length: f64 = drawn.map(|k: usize| (ways[k][0] * ways[k][0] + ways[k][1] * ways[k][1]).sqrt()).sum();
+        let length_of = |[x, y]: [i64; 2]| (x as f64 * x as f64 + y as f64 * y as f64).sqrt().round() as i64;
+        let length = drawn.map(|k: usize| length_of(ways[k])).sum::<i64>() as f64 / UNITS;
+        let corners = corners.map(|corner| corner.map(|v| v as f64 / UNITS));
         (area > 0.0).then_some(FaceOnScreen { corners, area, diameter: 4.0 * area / length })
     }
 

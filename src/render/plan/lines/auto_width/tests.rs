@@ -80,3 +80,28 @@ fn lines_are_faint_over_the_dense_part_of_a_mesh_alone() {
     assert!(along[..24].iter().all(|&opacity| opacity == 1.0), "{along:?}");
     assert!(along[96..].iter().all(|&opacity| opacity < 0.4), "{along:?}");
 }
+
+#[test]
+fn order_and_winding_of_faces_leave_no_trace() {
+    // A bent square whose columns get wider.
+    let n = 40;
+    let vertex = |i: usize| {
+        let (x, y) = ((i % (n + 1)) as f64, (i / (n + 1)) as f64);
+        format!("v {} {} {}\n", 0.37 * x * x, 14.8 * y, 3.0 * libm::sin(x + 0.7 * y))
+    };
+    let corners = |i: usize| {
+        let a = i / 2 / n * (n + 1) + i / 2 % n;
+        if i.is_multiple_of(2) { [a, a + 1, a + n + 2] } else { [a, a + n + 2, a + n + 1] }
+    };
+    let (vertices, faces) = ((n + 1) * (n + 1), 2 * n * n);
+    let face = |[a, b, c]: [usize; 3]| format!("f {} {} {}\n", a + 1, b + 1, c + 1);
+    let first: String = (0..vertices).map(vertex).chain((0..faces).map(|i| face(corners(i)))).collect();
+    let turned = |i: usize| {
+        let [a, b, c] = corners(i).map(|v| vertices - 1 - v);
+        [[c, b, a], [b, a, c], [a, c, b]][i % 3]
+    };
+    let other = (0..vertices).rev().map(vertex).chain((0..faces).rev().map(|i| face(turned(i))));
+    let [first, other] = [first, other.collect()].map(|obj| width_of(obj, [400, 300], false));
+    assert!(first.fade.is_some());
+    assert_eq!(first, other);
+}
