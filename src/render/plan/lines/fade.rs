@@ -88,7 +88,7 @@ impl Density {
     /// Adds a face that stands for `weight` faces, given its corners in pixels from the picture's upper left
     /// corner, its area in square pixels, and the shares of it that the thinner and the wider lines cover.
     pub fn add_face(&mut self, corners: [[f64; 2]; 3], area: f64, weight: f64, covered: [f64; 2]) {
-        let amounts = |area: f64| [area, area * covered[0], area * covered[1]].map(|v| (v * AREA_UNIT).round() as u64);
+        let amounts = |area: f64| [area, area * covered[0], area * covered[1]].map(|v| nearest(v * AREA_UNIT) as u64);
         let whole = amounts(area * weight);
         self.faces += 1;
         add(&mut self.of_faces, whole, 1);
@@ -156,7 +156,7 @@ impl Density {
         if !is_in_picture(0) || !is_in_picture(1) {
             return;
         }
-        let steps = place.map(|v| (v / f64::from(self.spacing_px) * STEPS).round() as usize);
+        let steps = place.map(|v| nearest(v / f64::from(self.spacing_px) * STEPS) as usize);
         let shares = |steps: usize| [STEPS as usize - steps % STEPS as usize, steps % STEPS as usize];
         let [x, y] = steps.map(|steps| steps / STEPS as usize);
         for (row, down) in (y..self.rows).zip(shares(steps[1])) {
@@ -203,6 +203,11 @@ impl Density {
 
 /// What is added to a point in whole, in the shares that points around a place have.
 const SHARES: u64 = (STEPS * STEPS) as u64;
+
+/// The nearest whole number. `f64::round` is a call on processors of any age, and three times as slow.
+pub fn nearest(v: f64) -> i64 {
+    (v + 0.5_f64.copysign(v)) as i64
+}
 
 fn add(sums: &mut [u64; 3], amounts: [u64; 3], share: u64) {
     for (sum, amount) in sums.iter_mut().zip(amounts) {

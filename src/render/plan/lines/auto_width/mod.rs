@@ -10,7 +10,7 @@ pub use open_edges::{OpenEdges, open_edges};
 
 use std::sync::Arc;
 
-use super::fade::{Density, LineFade};
+use super::fade::{Density, LineFade, nearest};
 use crate::mesh::Mesh;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
 use crate::plan::{PX, PlanError, Projection, Projector};
@@ -93,7 +93,7 @@ impl FaceSizes {
     /// Adds a face that stands for `weight` faces.
     fn add(&mut self, face: &FaceOnScreen, weight: f32) {
         let class = &mut self.0[class_of(face.diameter)];
-        *class = class.saturating_add((face.area * f64::from(weight) * 256.0).round() as u64);
+        *class = class.saturating_add(nearest(face.area * f64::from(weight) * 256.0) as u64);
     }
 
     /// The width of lines around these faces, pixels.
@@ -150,7 +150,7 @@ const FARTHEST: f64 = (1_u64 << 29) as f64;
 
 /// A distance in whole units, given in pixels.
 fn in_units(distance_px: f64) -> i64 {
-    (distance_px * UNITS).round().clamp(-FARTHEST, FARTHEST) as i64
+    nearest((distance_px * UNITS).clamp(-FARTHEST, FARTHEST))
 }
 
 /// A face as it is seen, pixels.
@@ -190,7 +190,7 @@ impl<'a> View<'a> {
         let area = (0.5 * twice as f64 / (UNITS * UNITS)).min(picture);
         let mask = if self.are_polygons { self.mesh.edge_masks.get(face).copied().unwrap_or(7) } else { 7 };
         let drawn = (0..3).filter(|k| mask >> k & 1 == 1);
-        let length_of = |[x, y]: [i64; 2]| (x as f64 * x as f64 + y as f64 * y as f64).sqrt().round() as i64;
+        let length_of = |[x, y]: [i64; 2]| nearest((x as f64 * x as f64 + y as f64 * y as f64).sqrt());
         let length = drawn.map(|k: usize| length_of(ways[k])).sum::<i64>() as f64 / UNITS;
         let corners = corners.map(|corner| corner.map(|v| v as f64 / UNITS));
         (area > 0.0).then_some(FaceOnScreen { corners, area, diameter: 4.0 * area / length })
