@@ -201,10 +201,11 @@ impl Density {
     }
 }
 
-/// What is added to a point in whole, in the shares that points around a place have.
+/// The share of a point that takes an amount in whole, where amounts are divided among the points around a place.
 const SHARES: u64 = (STEPS * STEPS) as u64;
 
-/// The nearest whole number. `f64::round` is a call on processors of any age, and three times as slow.
+/// The nearest whole number. Programs for all x86-64 processors call a function for `f64::round`; this is compiled in
+/// place.
 pub fn nearest(v: f64) -> i64 {
     (v + 0.5_f64.copysign(v)) as i64
 }

@@ -1,4 +1,4 @@
-//! How much light is blocked by the surfaces around a pixel (stage occlusion, screen-space ambient
+//! The light that the surfaces around a pixel block (stage occlusion, screen-space ambient
 //! occlusion). This is computed for the pixels of every second column and row; `spread` fills in
 //! the others. A pixel looks at 16 places around it. They are one of four sets, and neighbours look
 //! at different sets. How much the surface at a place blocks follows from its position in space.
