@@ -1,4 +1,4 @@
-// The compositing of a layer's colours, per pixel (stage shade). Layers are what depth peeling finds of transparent
+// The compositing of a layer's colours, per pixel (stage peeling). Layers are what depth peeling finds of transparent
 // surfaces, from front to back: in each round, for each sample, the nearest triangle behind the last round's. The
 // new layer's colours go under those of the layers in front of it. Twin of
 // src/render/backend/cpu/peeling/composite.rs.

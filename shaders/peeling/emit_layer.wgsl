@@ -1,4 +1,4 @@
-// The triangle that a sample keeps for a layer (stage visibility). Layers are what depth peeling finds of
+// The triangle that a sample keeps for a layer (stage peeling). Layers are what depth peeling finds of
 // transparent surfaces, from front to back. Of the triangles that cover the sample, the nearest one behind the
 // previous layer is kept. It must lie in front of the opaque surface, unless wires show through the surface. Twin
 // of src/render/backend/cpu/peeling/emit_layer.rs.

@@ -1,5 +1,5 @@
 // The test whether depth peeling is done: whether the previous round, which looked for the next layer of
-// transparent triangles, has left nothing to find (stage visibility). The commands of a round are recorded without
+// transparent triangles, has left nothing to find (stage peeling). The commands of a round are recorded without
 // waiting for the round before it, so the kernels of a needless round end at once by this test. No twin: the CPU
 // ends its loop over the rounds.
 //

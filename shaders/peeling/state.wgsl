@@ -1,4 +1,4 @@
-// The state of depth peeling that is kept for each sample from one transparent layer to the next (stage shade): the
+// The state of depth peeling that is kept for each sample from one transparent layer to the next (stage peeling): the
 // colour of the layers so far, the last layer's triangle and depth, and the materials seen. Twin of
 // src/render/backend/cpu/peeling/state.rs. Written by composite.wgsl, read by emit_layer.wgsl, mixed_pixels.wgsl,
 // shade.wgsl and coverage.wgsl.

@@ -1,5 +1,5 @@
 // The indices in the buffer `colors` at which composite.wgsl keeps the colours and depths of transparent layers,
-// per pixel (stage shade). coverage.wgsl reads them to tint the lines that lie behind these layers. Twin of
+// per pixel (stage peeling). coverage.wgsl reads them to tint the lines that lie behind these layers. Twin of
 // src/render/backend/cpu/peeling/tints.rs.
 //
 // Both kernels declare `colors`. It holds five things one after the other, each for all pixels of the band of rows

@@ -1,6 +1,7 @@
 // Groups of a pixel's samples that show the same triangle (stage shade). A group is shaded once, at the mean
-// position of its samples. With adaptive samples, a metal that mirrors sharply has a group in each quarter of the
-// pixel. Shared by shade.wgsl, paint.wgsl and composite.wgsl, each of which defines triangle_of_sample(sample).
+// position of its samples. With adaptive samples, a metal that mirrors sharply and has vertex normals has a group in
+// each quarter of the pixel, because what it mirrors changes within the pixel. Shared by shade.wgsl, paint.wgsl
+// and composite.wgsl, each of which defines triangle_of_sample(sample).
 //
 // Uses: common.wgsl (ADAPTIVE, has, pixel_corner, recip, rn2, sample_count, sample_offset,
 // SURFACE), one_job.wgsl or gang.wgsl (frame), peeling/composite.wgsl or surface/paint.wgsl or

@@ -1,7 +1,8 @@
 //! The build script, which tells the program the commit that it is built from, for `/version`.
 //!
-//! `MESHSNAP_COMMIT` comes first, for builds without the repository, such as that of the container. Otherwise an
-//! optimised build asks git. Other builds have none, so that a commit does not make them compile again.
+//! `MESHSNAP_COMMIT` comes first, for builds without the repository, such as that of the container. Otherwise a
+//! build of the release profile asks git. Builds of the dev profile have none, so that a commit
+//! does not make them compile again.
 
 use std::process::Command;
 

@@ -1,5 +1,5 @@
 //! The code that a process of the sandbox runs: it gives up its rights, decodes one file, sends the result back, and
-//! ends. A process of the sandbox is one in which a decoder written in C reads a file that may be hostile.
+//! ends. A process of the sandbox is one in which a decoder written in C or C++ reads a file that may be hostile.
 
 use std::fs::File;
 use std::io::{self, Read as _};

@@ -1,6 +1,6 @@
-//! The pool of sandboxed processes for decoders written in C. On a server, they are started ahead and wait for a
-//! file; on a command line, one is started when a file needs it. Each decodes one file and ends, and on a server
-//! another takes its place.
+//! The pool of sandboxed processes for decoders written in C or C++. On a server, they are started ahead and
+//! wait for a file; on a command line, one is started when a file needs it. Each decodes one file and ends, and on
+//! a server another takes its place.
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};

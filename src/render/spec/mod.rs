@@ -1,6 +1,6 @@
 //! The specification of a picture: a [`Spec`] is a request after it was read and checked. It says what to
-//! draw of any mesh, and how, with styles applied and defaults filled in. Every value is in range; units
-//! are in the names.
+//! draw of any mesh, and how, with styles applied and defaults filled in. Every value is in range. The
+//! unit of a field is in its name (`fov_deg`) or in its comment.
 
 mod background;
 mod camera;

@@ -1,5 +1,7 @@
-//! Enumerations whose values a request names by words, such as `perspective`. Each value is written down
-//! once beside its word; the reader of requests, its error messages and the schema use this list.
+//! The words by which requests name the values of enumerations, such as `perspective` for
+//! `ProjectionKind::Perspective`: the trait [`Words`], and the macro by which the other files of `spec`
+//! define an enumeration with its words. The reader of requests, its error messages and the schema use
+//! these lists.
 
 use crate::image::ImageFormat;
 use crate::mesh::UpAxis;

@@ -1,7 +1,8 @@
-//! The finest mip level that is kept of each texture, so that all textures of a picture fit into one buffer.
+//! The finest mip level that is kept of each texture, so that all textures of a picture fit into one buffer
+//! of at most [`TEXELS_MAX`] texels.
 //!
-//! Together they have at most [`TEXELS_MAX`] texels. While they have more, the largest texture
-//! loses its finest level.
+//! Levels finer than the picture can show go first. If those that it shows are still too many, the largest
+//! texture loses its finest level, again and again until all fit.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

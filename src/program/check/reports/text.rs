@@ -1,5 +1,5 @@
 //! Verdicts of `meshsnap check` as text for a person: a line for a file, then a line for each rule that it breaks,
-//! with the first places of the fault, and a line for each change.
+//! with the first places of the fault, and with `--since` a line for each change of the mesh since that commit.
 
 use std::fmt::Write as _;
 
@@ -21,7 +21,7 @@ pub fn text(verdict: &Verdict) -> String {
     text
 }
 
-/// The first places of a fault: `; at (0, 0, 1) to (0, 1, 1) and 2 more`
+/// The first places of a fault: `; at (0, 0, 1) to (0, 1, 1), and 2 more`
 pub fn at(check: &Check) -> String {
     let named: Vec<String> = check.places.iter().take(PLACES_MAX).map(place).collect();
     if named.is_empty() {

@@ -9,8 +9,8 @@ use crate::spec::color::Rgba;
 /// A colour map as linear colours, from the lowest number to the highest.
 pub type ColorMap = LazyLock<[[f32; 4]; 256]>;
 
-/// From dark blue to yellow, lighter all the way: viridis by Smith and van der Walt, released into the
-/// public domain (CC0), at every eighth or so of its length.
+/// From dark purple to yellow, lighter all the way: viridis by Smith and van der Walt, released into the
+/// public domain (CC0), at ten places of its length.
 pub static SEQUENTIAL: ColorMap = LazyLock::new(|| {
     between(&[
         [0x44, 0x01, 0x54],

@@ -1,5 +1,5 @@
 //! The table of measured errors and times, `error_table.json`, as `quality` reads it. It has a row
-//! for each drawing technique (a way to draw the edges of faces, wires or outlines), back-end and
+//! for each drawing technique (a way to draw surfaces, wires or outlines), back-end and
 //! number of samples. From these rows follow the error and the time to expect of a picture of any
 //! size. The benchmark writes the table (`cargo bench --bench accuracy -- --write`), whose key
 //! `about` explains its numbers.

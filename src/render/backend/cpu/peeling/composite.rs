@@ -1,5 +1,5 @@
 //! The compositing of the transparent layers of each sample, front to back, and then of the surface
-//! under them (stage shade). Twin of `shaders/peeling/composite.wgsl`.
+//! under them (stage peeling). Twin of `shaders/peeling/composite.wgsl`.
 //!
 //! Layers are found by depth peeling (Everitt 2001, "Interactive order-independent transparency"),
 //! for each sample by itself. [`draw`] runs the rounds. Each round finds the nearest triangle

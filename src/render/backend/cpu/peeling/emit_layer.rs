@@ -1,5 +1,5 @@
 //! The search for the next transparent layer of each sample, which is the nearest triangle behind the previous layer
-//! (stage visibility). Each round of depth peeling runs it once. Twin of `shaders/peeling/emit_layer.wgsl`.
+//! (stage peeling). Each round of depth peeling runs it once. Twin of `shaders/peeling/emit_layer.wgsl`.
 
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::context::RasterContext;

@@ -1,5 +1,5 @@
 //! Depth peeling, by which transparent surfaces are drawn: it finds their layers at each sample from front to back
-//! (stages visibility and shade).
+//! (stage peeling).
 //!
 //! Each round, [`emit_layer`] finds the next layer of every sample, and [`composite`] shades it under the layers in
 //! front. [`state`] is what a sample keeps from round to round, and [`tints`] is the colour that layers give to the

@@ -1,5 +1,5 @@
 //! The state of depth peeling, which finds transparent layers from front to back: what each sample keeps from one
-//! layer to the next, such as the colour so far (stage shade). Twin of `shaders/peeling/state.wgsl`.
+//! layer to the next, such as the colour so far (stage peeling). Twin of `shaders/peeling/state.wgsl`.
 
 use super::tints::Tints;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};

@@ -1,5 +1,5 @@
 //! The tints that lines take from the transparent layers in front of them: what each layer adds to
-//! a pixel, and its depth there (stage shade). From the fourth layer on, all count as one. Twin of
+//! a pixel, and its depth there (stage peeling). From the fourth layer on, all count as one. Twin of
 //! `shaders/peeling/tints.wgsl`.
 //!
 //! The depth of a layer is known at samples, which may lie beside the line. So a layer counts as in

@@ -1,7 +1,7 @@
-//! The search for the pixels of a row that show more than one face: in their own samples, or in the
-//! closest samples of the pixels on the left and above (stage mixed). Only there can faces of
-//! different colours meet. Pixels where they do are drawn a second time, from more points. This
-//! search is for pictures with four samples per pixel.
+//! The search for the pixels of a row whose samples show more than one face: their own samples, or one of
+//! them and the closest sample of the pixel on the left or above (stage mixed). Only the samples of these
+//! pixels have to be compared by colour, to find the pixels that are drawn a second time from more points.
+//! This search is for pictures with four samples per pixel.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
