@@ -1,7 +1,7 @@
 // The test whether a dispatch draws a triangle at all. The triangle must have an area on screen, show the wanted
-// side (front or back), and belong to the pass that is being drawn: that of the visibility buffer or that of
-// transparent layers. One byte per triangle, its pass mask, says to which of them it belongs. Used by the stages
-// visibility, lines and mixed.
+// side (front, back or either), and belong to the pass that is being drawn: that of the visibility buffer or that
+// of transparent layers. One byte per triangle, its pass mask, says to which of them it belongs. Used by the
+// stages visibility, peeling, mixed and lines.
 //
 // Uses: common.wgsl (FACES_BACK, FACES_BOTH, FACES_FRONT, has, PASS_BACK_ONLY, PASS_FRONT_ONLY,
 // PASS_MASKS), one_job.wgsl or gang.wgsl (batch), geometry/triangle.wgsl (is_negative, is_zero).

@@ -2,7 +2,7 @@
 // px. Twin of src/render/backend/cpu/geometry/transform.rs.
 //
 // The same kernel empties two buffers: the visibility buffer for the first band of rows of the picture, and the
-// work list (triangles that are too large for one thread). Separate commands would be slower than these stores.
+// work list (triangles that whole workgroups draw). Separate commands would be slower than these stores.
 //
 // Uses: common.wgsl (homogeneous, OUTSIDE, recip, rn, round_to_i32, Vertex, WORKGROUP),
 // one_job.wgsl or gang.wgsl (batch, begin_job, frame, job).

@@ -1,5 +1,5 @@
 // The set-up of a triangle on screen: its area, the plane of its depth, its edge functions, and the pixels that it
-// spans. Made for stage visibility; the stages shade, mixed and lines use it too.
+// spans. Made for stage visibility; later stages use it too.
 //
 // Uses: common.wgsl (mul_wide, negate_wide, recip, rn, sub_wide, Vertex, wide_to_f32), one_job.wgsl
 // or gang.wgsl (batch, frame).

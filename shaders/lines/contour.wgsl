@@ -1,8 +1,8 @@
 // The test whether an edge is drawn in this view (stage lines). Edges are drawn in passes, each with lines of one
 // width and colour. A pass of contours draws silhouettes only: edges whose faces all lie on one side of them on
-// screen. On closed surfaces an edge is dropped if all its faces face away from the viewer. Also the choice of the
-// face whose light falls on the edge's line. Twin of src/render/backend/cpu/lines/contour.rs. edge.wgsl declares
-// the buffers.
+// screen. If the surface is closed and hides its inside, and the pass leaves hidden lines out, an edge is dropped if
+// all its faces face away from the viewer. Also the choice of the face whose light falls on the edge's line. Twin of
+// src/render/backend/cpu/lines/contour.rs. edge.wgsl declares the buffers.
 //
 // Uses: common.wgsl (CONTOUR, CONTOURS, has, INSIDE_OUT, OUTSIDE, rn, SKIP_BACK), one_job.wgsl
 // (batch), geometry/triangle.wgsl (area_of, is_negative, is_zero), lines/edge.wgsl (triangles,

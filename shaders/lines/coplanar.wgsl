@@ -1,7 +1,7 @@
-// The test whether a triangle hides an edge that lies in the triangle's own plane (stage lines). It does if all
-// faces of the edge lie behind the plane, as those of a wall on a floor do if seen from below. Depths cannot tell
-// this, because edge and triangle have the same depth. Twin of src/render/backend/cpu/lines/coplanar.rs, which
-// says more. edge.wgsl declares the buffers.
+// The test whether a triangle hides an edge that lies in the triangle's own plane (stage lines). For this, all
+// faces of the edge have to lie behind the plane, as those of a wall on a floor do if seen from below. Depths
+// cannot tell this, because edge and triangle have the same depth. Twin of
+// src/render/backend/cpu/lines/coplanar.rs, which says more. edge.wgsl declares the buffers.
 //
 // Uses: common.wgsl (NAMES_ALL_FACES, OUTSIDE, recip, rn, rn3), one_job.wgsl (batch, frame),
 // geometry/steepness.wgsl (MIN_POSITIVE, NEARER_RATIO, sides_of, sum3), lines/contour.wgsl

@@ -1,7 +1,7 @@
 // The coverage of each pixel by the lines of a pass (lines of one width and colour), and the compositing of their
-// colour over the pixel, weighted by the coverage (stage lines). The area that the line of one edge covers is a
-// stroke. The coverage is that of the union of all strokes in the pixel, or follows from the area that lines leave
-// free (holes/holes.wgsl). Twin of src/render/backend/cpu/lines/coverage.rs.
+// colour over the pixel, weighted by the coverage (stage lines). A stroke is the area that the line of one part of
+// an edge covers. The coverage is that of the union of all strokes in the pixel, or follows from the area that
+// lines leave free (holes/holes.wgsl). Twin of src/render/backend/cpu/lines/coverage.rs.
 //
 // Uses: common.wgsl (ADAPTIVE, FIRST_PASS, first_visibility_sample, has, HOLED, HOLES, HULL,
 // LIT_PASS, PEELING, recip, rn, rn3, rn4, rolled_off, sample_count, SURFACE, TINTED_PASS, Vertex,

@@ -1,6 +1,7 @@
-// Stage lines, per edge: draws the edge as a line of exact width. The kernel finds the visible (or hidden) parts
-// of the edge. To each pixel that a part touches it adds a stroke: all that lies within half the line's width of
-// the part. coverage.wgsl makes colours of the strokes. Twin of src/render/backend/cpu/lines/edge.rs.
+// Stage lines, per edge: draws the edge as a line of exact width. The kernel finds the visible (or hidden) parts of
+// the edge. To the pixels that a part touches (only to some, where holes/holes.wgsl finds the coverage) it adds a
+// stroke: all that lies within half the line's width of the part. coverage.wgsl makes colours of the strokes. Twin of
+// src/render/backend/cpu/lines/edge.rs.
 //
 // An edge is cut along its length into windows, and the pixel rows of a window into slices. Such a slice is called
 // a share here. A workgroup has some edges. Each of its threads looks at one share, to find out whether there is

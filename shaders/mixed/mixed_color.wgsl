@@ -4,7 +4,7 @@
 // src/render/backend/cpu/mixed/color.rs.
 //
 // Used where mixed pixels have no lists of triangles (lists.wgsl): for pictures in linear light, and if a picture
-// is drawn once more because the lists of the first attempt had no room. Otherwise mixed_parts.wgsl,
+// is drawn once more because the lists of the first attempt overflowed. Otherwise mixed_parts.wgsl,
 // mixed_shade.wgsl and mixed_sum.wgsl do this work.
 //
 // Uses: common.wgsl (has, LINES, WORKGROUP), one_job.wgsl (batch), mixed/lattice.wgsl (FEW_STEP,

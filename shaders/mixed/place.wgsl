@@ -3,8 +3,8 @@
 // The CPU's counterpart is MixedPixels in src/render/backend/cpu/mixed/find/pixels.rs.
 //
 // Mixed pixels are numbered from 0. The words of the buffer are, one group after the other:
-// - 4 words: the number of mixed pixels; 1 if there was no room for all lists or parts, else 0; the number of
-//   items of all lists; the number of all parts
+// - 4 words: the number of mixed pixels; 1 if lists or parts overflowed (no room, or a list too long), else 0; the
+//   number of items of all lists; the number of all parts
 // - for each pixel of the band: 0 if it is not mixed, else 1 more than its number; with the bit FEW where 64 of
 //   its 256 points are enough
 // - for each mixed pixel, by number: its index in the band, with FEW likewise

@@ -1,10 +1,10 @@
-// The points at which each triangle of a mixed pixel is visible, as sets with a bit per point (stage mixed). Mixed pixels
-// are drawn again, from 64 or 256 points each, because different colours meet there. Counting bits gives the triangle's
-// share of the points, and their mean position. A workgroup works on one pixel at a time. Twin of
+// The points at which each triangle of a mixed pixel is visible, as sets with a bit per point (stage mixed). Mixed
+// pixels are drawn again, from 64 or 256 points each, because different colours meet there. Counting bits gives
+// the triangle's share of the points, and their mean position. A workgroup works on one pixel at a time. Twin of
 // src/render/backend/cpu/mixed/points.rs.
 //
-// Workgroup memory has room for one set per thread. For pixels with more triangles, and in pictures whose triangles may be
-// clipped, shares.wgsl is used, which goes through all points.
+// Workgroup memory has room for one set per thread. For pixels with more triangles, and in pictures whose
+// triangles may be clipped, shares.wgsl is used, which goes through all points.
 //
 // Uses: common.wgsl (recip, rn2, WORKGROUP), mixed/lattice.wgsl (FEW_STEP, point_place, POINTS,
 // Share), mixed/shares.wgsl (firsts, FIRSTS_WORDS, seen), surface/material.wgsl (is_quartered).

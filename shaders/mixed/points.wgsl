@@ -2,7 +2,7 @@
 // or 256 points each, because different colours meet there. The kernel computes the triangle's depth at each point
 // that it covers, and a buffer keeps the nearest triangle of each point, for mixed_color.wgsl. Used where mixed
 // pixels have no lists of triangles (lists.wgsl): for pictures in linear light, and if a picture is drawn once
-// more because the lists of the first attempt had no room. Twin of src/render/backend/cpu/mixed/triangle/mod.rs.
+// more because the lists of the first attempt overflowed. Twin of src/render/backend/cpu/mixed/triangle/mod.rs.
 //
 // Uses: common.wgsl (pixel_corner), one_job.wgsl (batch, frame), geometry/triangle.wgsl (Edges,
 // edges_of, Setup), mixed/lattice.wgsl (depth_at_point, FEW_FIRST, FEW_STEP, POINTS,

@@ -1,6 +1,6 @@
-// The linear depth of each pixel's first sample (stage occlusion, which darkens hollows): the distance from the
-// far plane towards the viewer. This kernel writes it for each pixel, by the formula of place.wgsl, from the value
-// of the depth buffer. gather.wgsl and spread.wgsl read it. Twin of src/render/backend/cpu/occlusion/grid.rs.
+// The linear depth of the surface at each pixel's first sample (stage occlusion, which darkens hollows): the distance
+// from the far plane towards the viewer. This kernel writes it for each pixel, by the formula of place.wgsl, from the
+// value of the depth buffer. gather.wgsl and spread.wgsl read it. Twin of src/render/backend/cpu/occlusion/grid.rs.
 //
 // Uses: common.wgsl (first_visibility_sample, WORKGROUP), one_job.wgsl or gang.wgsl (batch,
 // begin_job, frame), occlusion/place.wgsl (NOWHERE, place_of).

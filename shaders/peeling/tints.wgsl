@@ -3,8 +3,8 @@
 // src/render/backend/cpu/peeling/tints.rs.
 //
 // Both kernels declare `colors`. It holds five things one after the other, each for all pixels of the band of rows
-// that is being drawn: the colours, the light on lines, the colour that each layer adds, the layers' depths, and
-// their steepness (the slope of the depth on screen).
+// that is being drawn: the colours, the light on lines, the colour that each layer adds (from the fourth on, all
+// count as one), the layers' depths, and their steepness (the slope of the depth on screen).
 //
 // Uses: common.wgsl (has, LINES), one_job.wgsl (batch, frame).
 

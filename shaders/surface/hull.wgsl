@@ -1,5 +1,5 @@
 // The colours of the hull, the mesh of triangles beside silhouette edges that is drawn as the outline of a surface
-// (stages shade and mixed). Also the id that stands for no triangle.
+// (stages peeling, shade and mixed). Also the id that stands for no triangle.
 //
 // Uses: common.wgsl (has, HULL_MATERIALS), one_job.wgsl or gang.wgsl (frame).
 

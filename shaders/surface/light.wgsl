@@ -1,8 +1,9 @@
-// The light on a point of the surface (stage shade): from lamps, from above and below and, for metals, from surroundings
-// that they mirror. All of it is computed by formulas, without images. Twin of src/render/backend/cpu/surface/light.rs.
+// The light on a point of the surface (stage shade): from lamps, from above and below and, for metals, from
+// surroundings that they mirror. All of it is computed by formulas, without images. Twin of
+// src/render/backend/cpu/surface/light.rs.
 //
-// For faces that have one normal, the result has the same bits as on the CPU. Such a face has one light, which may lie on
-// the rounding threshold between two 8-bit values: then the smallest difference would change all its pixels.
+// For faces that have one normal, the result has the same bits as on the CPU. Such a face has one light, which may
+// lie on the rounding threshold between two 8-bit values: then the smallest difference would change all its pixels.
 //
 // Uses: common.wgsl (dot3, quick_recip, rn, rn3, rolled_off), one_job.wgsl or gang.wgsl (frame).
 

@@ -1,5 +1,6 @@
-// Stage shade, per pixel: the colour of each visible triangle is computed once and weighted by the number of
-// samples that show it. Transparent layers in front are added. Twin of src/render/backend/cpu/surface/shade.rs.
+// Stage shade, per pixel: the colour of each visible triangle is computed once (of a metal that mirrors sharply,
+// perhaps in each quarter of the pixel) and weighted by the number of samples that show it. Transparent layers in
+// front are added. Twin of src/render/backend/cpu/surface/shade.rs.
 //
 // Uses: common.wgsl (first_visibility_sample, has, OCCLUSION, PASS_LAYER, PEELING, rn, rn4,
 // sample_count, WIRES_ONLY, WORKGROUP), one_job.wgsl or gang.wgsl (batch, begin_job, frame),

@@ -1,5 +1,5 @@
 // Texture lookups (stage shade): the colour of a texture at a point of the surface, filtered over the part of the
-// texture that a pixel covers. Twin of src/render/backend/cpu/surface/texture/mod.rs.
+// texture that a pixel covers, or that of the nearest texel. Twin of src/render/backend/cpu/surface/texture/mod.rs.
 //
 // The result has the same bits as on the CPU, because a small difference can show: alpha decides whether an alpha
 // mask leaves a point out, and without filtering a point on the border of two texels gets the colour of one of

@@ -1,5 +1,6 @@
 //! The test whether an image of a mesh (a texture) is damaged, without decoding its pixels: its header is read, and
-//! of a PNG also the checksums. Reports name the images that fail it, and so does the rule `no-warnings`.
+//! of a PNG also the checksums of the chunks that change pixels, up to the end. Reports name the images that fail it,
+//! and so does the rule `no-warnings`.
 
 use std::io::BufRead;
 

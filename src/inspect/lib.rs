@@ -1,5 +1,5 @@
 //! The crate that judges and compares meshes: the [`report`] on one, its [`check`] by rules, and
-//! the [`diff`] of two.
+//! the [`diff`] of two, or of two pictures.
 //!
 //! [`read`] reads the meshes, [`drawing`] makes pictures of what was found. [`geometry`] has what
 //! reports, rules and differences compute: distances, thickness, intersections, charts of texture

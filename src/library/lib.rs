@@ -18,9 +18,9 @@
 //!
 //! - [`Mesh`] is read once, from the bytes of any format that is known, and drawn as often as needed.
 //! - [`Spec`] says what to draw: a style, setters for what is asked for often, and the keys of the request document.
-//! - [`Renderer`] draws, on the CPU or on a GPU, and gives an [`Image`]. A [`Watch`] reports the end of each stage and can
-//!   stop the drawing. [`Renderer::linear`] gives linear light as half floats ([`struct@f16`] is that of the crate
-//!   `half`), and [`Renderer::faces`] tells the triangle and the distance of each pixel.
+//! - [`Renderer`] draws, on the CPU or on a GPU, and gives an [`Image`]. A [`Watch`] reports the end of each stage
+//!   and can stop the drawing. [`Renderer::linear`] gives linear light as half floats ([`struct@f16`] is that of the
+//!   crate `half`), and [`Renderer::faces`] tells the triangle and the distance of each pixel.
 //! - [`Error`] says what went wrong; [`Error::fault`] says who can mend it.
 //!
 //! # Features

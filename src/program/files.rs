@@ -1,5 +1,5 @@
 //! The reading of a file, or of standard input under the name `-`, up to a largest size, and the writing to standard
-//! output. The error for a misspelt name proposes the nearest one in the same folder.
+//! output. The error for a misspelt name proposes a similar one in the same folder, if there is one.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read as _, Seek as _, Write as _};

@@ -2,8 +2,8 @@
 //!
 //! Exit codes: 0 success; 1 a fault of the mesh or the request, or an answer that is no (a check failed, two files
 //! differ, a server is not healthy); 2 a fault of the command line or the configuration; 3 a fault of meshsnap or the
-//! machine. Errors are one sentence each on standard error; only those of the parser of arguments, clap, may be
-//! longer.
+//! machine. Errors are one sentence each on standard error; only those of the parser of arguments, clap, and of
+//! panics may be longer.
 
 /// Prints a line to standard error. `eprintln!` panics where nobody reads on, as after `2>&1 | head`.
 macro_rules! say {

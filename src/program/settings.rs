@@ -1,5 +1,5 @@
-//! Command-line flags, made from the server's table of settings: for `serve` all settings that may be flags, for the
-//! commands that read meshes only limits.
+//! Command-line flags and their environment variables, made from the server's table of settings: for `serve` all
+//! settings that may be flags, for the commands that read meshes only limits, without those of the service alone.
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::error::ErrorKind;

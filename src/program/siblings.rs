@@ -1,7 +1,7 @@
-//! The search for the files that a mesh refers to, that lie beside it, and that the command does
-//! not name, such as its textures. Where the command allows it (by `--siblings`, or for meshes
-//! found in a folder that it names), they are read. Otherwise a sentence advises the user to name
-//! them.
+//! The search for the files that a mesh refers to and that lie beside it, such as its textures. They
+//! are read where the command allows it: by `--siblings`, for meshes found in a folder that it names,
+//! or, if it reads many meshes, by naming the files. Otherwise `render` and `check` advise the user
+//! to name them.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;

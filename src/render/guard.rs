@@ -1,7 +1,7 @@
 //! A guard around calls of decoders from other crates: a panic in a decoder becomes an error.
 //!
 //! Decoders read files of unknown origin, which may be made to break them. A panic that is caught here
-//! costs one job, and the error says which decoder failed. The panic hook has logged where.
+//! costs one job at most, and the error says which decoder failed. The panic hook has logged where.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 

@@ -1,7 +1,7 @@
 //! A finished picture in memory: sRGB bytes (`Image`), or half floats in linear light (`LinearImage`).
-//! Its bytes may lie in memory that a GPU has written, and are then read in place. The formats of picture
-//! files, and the interface to an encoder that takes rows while others are being drawn, are defined here,
-//! too.
+//! The bytes of an `Image` may lie in memory that a GPU has written, and are then read in place. The
+//! formats of picture files, the interface to an encoder that takes rows while others are being drawn,
+//! and the linear values at which an sRGB byte changes are defined here, too.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! The caps of one job, and the two things that a job spends: bytes ([`Budget`]) and time
+//! The caps of one job, and what a job spends: bytes and pixels of textures ([`Budget`]), and time
 //! ([`Deadline`]).
 //!
 //! **Invariant**: an allocation whose size follows from the input is first spent from the job's
@@ -215,7 +215,7 @@ impl Budget {
 #[error("the job was stopped before it finished")]
 pub struct Stopped;
 
-/// One of the two things that a job spends is used up.
+/// Something that a job spends is used up.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Exhausted {
     /// The budget, or another cap.

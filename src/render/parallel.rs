@@ -1,9 +1,9 @@
 //! Parallel work on the items of a list, such as pieces of a file or of a mesh.
 //!
-//! The thread pool that the caller is in does the work, or else rayon's own, which has a thread for
-//! each core. The calling thread does a single piece. No result depends on the number of threads.
-//! `beside` alone starts threads of its own, which work while the calling thread does something
-//! else.
+//! The thread pool that the caller is in does the work, or else rayon's own, which by default has a
+//! thread for each core. Where there is only one piece, the calling thread does it. No result depends on
+//! the number of threads. `beside` alone starts threads of its own, which work while the calling thread
+//! does something else.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::thread;

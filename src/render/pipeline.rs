@@ -6,9 +6,10 @@
 //! that is read already into a picture.
 //!
 //! Invariant: nothing from here down knows an async runtime, or reads or writes a file or the
-//! environment, except the file of a GPU's compiled pipelines. Clocks are read to time the stages
-//! of drawing, to choose the back-end while the GPU is busy, and to pause a GPU that was lost
-//! several times. Nothing else depends on them.
+//! environment, except the file of a GPU's compiled pipelines, and except in `ignore_displays`, which
+//! the program calls at its start. Clocks are read to time the stages of drawing, to choose the back-end
+//! while the GPU is busy, and to pause a GPU that was lost several times. Nothing else depends on time,
+//! except that a GPU that does not answer for two minutes counts as lost.
 
 mod faces;
 
@@ -403,7 +404,7 @@ pub struct DrawReport {
     pub draw_times: DrawTimes,
     /// The parts of drawing that the plan leaves out, with reasons.
     pub skips: Vec<Skip>,
-    /// Chains of outlines that the plan leaves out because they are short.
+    /// Chains of feature edges and outlines that the plan leaves out because they are short.
     pub short_chains: u32,
     /// Parts of the request that do not go with the mesh.
     pub warnings: Vec<Warning>,

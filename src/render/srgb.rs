@@ -1,5 +1,6 @@
 //! The sRGB transfer function, from sRGB to linear light. Colours are computed in linear light;
-//! files and pictures store them as sRGB. The way back is `srgb8_thresholds` in `image`.
+//! requests, colour textures and 8-bit pictures have them as sRGB. The way back is `srgb8_thresholds`
+//! in `image`.
 
 /// The linear value of an sRGB component (IEC 61966-2-1): 0 to 1 becomes 0 to 1, and the same curve
 /// goes on beyond 1.

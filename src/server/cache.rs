@@ -1,4 +1,4 @@
-//! A cache with a limit on the bytes of its values together, for answers ([`pictures`](super::pictures)) and for
+//! A cache with a limit on the bytes of all its names and values, for answers ([`pictures`](super::pictures)) and for
 //! meshes ([`residents`](super::residents)). Where room is short, values that are used least go first: the crate
 //! `quick_cache` chooses them, by an algorithm like Clock-PRO.
 

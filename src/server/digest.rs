@@ -1,4 +1,4 @@
-//! SHA-256 digests, the names of meshes and of files in the data folder.
+//! SHA-256 digests, such as the names of stored meshes and of bytes in the data folder.
 
 use std::fmt;
 

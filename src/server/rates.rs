@@ -1,5 +1,6 @@
-//! Rate limits of each client (an API key, or an address where there are no keys): how many
-//! requests per second, how many in a burst, and how many uploads and jobs (POST and PUT) per day.
+//! Rate limits of each client (an API key, or an address where there are no keys): how many requests per second, how
+//! many in a burst, and how many uploads and jobs (POST and PUT) per day. What is used comes back steadily, not at
+//! once at the end of a second or a day.
 
 use std::num::NonZeroU32;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,7 +1,7 @@
-//! The warm-up of a hardware GPU: right after the start, a thread opens it and makes the pipelines
-//! (compiled shaders) of every style of picture, so that the first pictures need not wait for that.
-//! It covers plain meshes: textures, colours, several materials and other numbers of samples need
-//! more pipelines.
+//! The warm-up of a hardware GPU: right after the start, unless the CPU is the default back-end, a thread opens it
+//! and makes the pipelines (compiled shaders) of every style of picture, so that the first pictures need not wait for
+//! that. It covers plain meshes: textures, colours, several materials and other numbers of samples need more
+//! pipelines.
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};

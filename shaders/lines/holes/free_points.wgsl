@@ -1,9 +1,10 @@
 // The coverage of a pixel by lines, found from 256 points of the pixel (stage lines). Used in pixels in which the
-// surface ends or a face is partly hidden, because there the quicker way of holes.wgsl, a sum of areas, is not
-// right. In a few of these, points are not right either, and edge.wgsl draws the lines instead. Each point belongs
-// to one of the pixel's samples. A point is free of lines if its sample shows a face and the point lies at least
-// half a line's width inside that face, or if its sample shows nothing. Twin of
-// src/render/backend/cpu/lines/holes/free_points.rs. coverage.wgsl declares the buffers.
+// surface ends or a face is partly hidden, because there the quicker way of holes.wgsl, a sum of areas, is not right.
+// In some of these (in all, with one sample per pixel) points are not right either, and edge.wgsl draws the lines
+// instead. Each point belongs to one of the pixel's samples. A point is free of lines if its sample shows a face and
+// the point lies at least half a line's width inside that face, or if its sample shows nothing. The strokes of
+// silhouette edges are added to the points. Twin of src/render/backend/cpu/lines/holes/free_points.rs. coverage.wgsl
+// declares the buffers.
 //
 // Uses: common.wgsl (pixel_corner, rn, sample_count), one_job.wgsl (batch, frame),
 // lines/coverage.wgsl (sample_masks, strokes, triangles, vertices), lines/holes/inset.wgsl

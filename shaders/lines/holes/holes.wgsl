@@ -1,8 +1,9 @@
-// The area of each pixel that lines leave free, where all edges of a surface are drawn as lines (stage lines). It
-// is the sum of the insets of the faces there: an inset is the part of a face that is at least half a line's width
-// from all its sides. The kernel marks the pixels in which this sum is not right. Their coverage is found from
-// points (free_points.wgsl) or by drawing edge by edge (edge.wgsl). Twin of
-// src/render/backend/cpu/lines/holes/mod.rs, which explains insets, marks and points.
+// The area of each pixel that lines leave free (stage lines), for passes that draw all edges of a surface and satisfy
+// DrawPlan::has_holes_under in src/render/plan/lines/mod.rs. It is the sum of the insets of the faces there: an inset
+// is the part of a face that is at least half a line's width from all its sides. The kernel marks pixels in which
+// this sum is not right (tips.wgsl and edge.wgsl mark others). Their coverage is found from points (free_points.wgsl)
+// or by drawing edge by edge (edge.wgsl). Twin of src/render/backend/cpu/lines/holes/mod.rs, which explains insets,
+// marks and points.
 //
 // The CPU goes from face to face. Here a thread has a pixel, so that no two threads add to the same sum. It goes
 // through the faces that are visible in the pixel and in the eight around it, because an inset may reach into a

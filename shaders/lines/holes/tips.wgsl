@@ -1,7 +1,7 @@
-// The search for tips (stage lines): corners that are visible although no sample of their pixel shows their
-// triangle, such as the point of a spike. holes.wgsl finds faces by their samples, and so misses these. This
-// kernel marks the pixels around a tip, and edge.wgsl draws the lines of marked pixels edge by edge. Twin of
-// src/render/backend/cpu/lines/holes/tips.rs.
+// The search for tips (stage lines): corners that are visible in front of other faces although no sample of their
+// pixel shows their own triangle, such as the point of a spike. holes.wgsl finds faces by their samples, and so
+// may miss these. This kernel marks the pixels around a tip, and edge.wgsl draws the lines in them edge by edge.
+// Twin of src/render/backend/cpu/lines/holes/tips.rs.
 //
 // Uses: common.wgsl (mul_wide, OUTSIDE, rn, sample_count, sub_wide, Vertex, WORKGROUP),
 // one_job.wgsl (batch, frame), geometry/culling.wgsl (passes_culling), geometry/triangle.wgsl

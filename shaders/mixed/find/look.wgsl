@@ -1,7 +1,7 @@
 // The look of a face (stage mixed): numbers for what decides its colour, such as material and normals, as far as
-// that is known without shading it. From the looks of two faces, breaks.wgsl and thin.wgsl find out whether there
-// is a colour break between them, a place where the colour differs clearly. Twin of
-// src/render/backend/cpu/mixed/find/look.rs.
+// that is known without shading it. From the looks of two faces, and from the corners that they share, breaks.wgsl
+// and thin.wgsl find out whether there is a colour break between them, a place where the colour differs clearly.
+// Twin of src/render/backend/cpu/mixed/find/look.rs.
 //
 // Uses: common.wgsl (has, OUTSIDE, rn3, SURFACE, TRIANGLE_MATERIALS, UVS, Vertex, VERTEX_COLORS,
 // VERTEX_NORMALS), one_job.wgsl (frame), geometry/triangle.wgsl (area_of, is_negative),

@@ -1,6 +1,7 @@
-//! The judgement of a mesh by rules: one result per rule, in the order of the rules, with the number that was found,
-//! the number that is allowed, a sentence, and the first places where the rule is broken. Edges and topology are
-//! computed when the first rule needs them. Also the result for a file that cannot be read.
+//! The judgement of a mesh by rules: one result per rule, in the order of the rules, with a sentence and, as far as
+//! the rule has them, the number that was found, the number that is allowed, and the first places where the rule is
+//! broken. Edges and topology are computed when the first rule needs them. Also the result for a file that cannot be
+//! read.
 
 use std::rc::Rc;
 
@@ -25,8 +26,8 @@ pub fn unopened(detail: impl Into<String>) -> Check {
     finding.of(Rule::Opens, Level::Error)
 }
 
-/// The check of a file that could not be read. None where that is not the file's fault: of a bundle in which the mesh
-/// is not clear, and of limits.
+/// The check of a file that could not be read. None where that is not the file's fault: of a bundle that cannot be
+/// unpacked or in which the mesh is not clear, and of limits.
 pub fn of_unreadable(error: &MeshError) -> Option<Check> {
     match error.fault {
         MeshFault::BundleBroken | MeshFault::EntryUnclear | MeshFault::Limit(_) | MeshFault::Stopped => None,

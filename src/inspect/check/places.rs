@@ -1,7 +1,6 @@
 //! Places of faults: the vertex, the edge or the face where a rule is broken, with positions in the coordinates of
 //! the file (in memory, a mesh is scaled into a box of side 1). All faults are counted, and the first of them are
-//! kept with their places. Positions are rounded to about seven digits, because those of a mesh are f32 and have no
-//! more.
+//! kept with their places. Positions are rounded, because those of a mesh are f32 and have about seven digits.
 
 use super::Place;
 use meshsnap_render::mesh::Mesh;

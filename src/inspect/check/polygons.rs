@@ -1,6 +1,6 @@
 //! Polygons with more than four corners, for the rule `no-ngons`. Reading has divided all polygons into triangles and
 //! has marked the edges that it added, so that the triangles of one polygon can be put together again here: more than
-//! two of them make such a polygon.
+//! two of them make such a polygon. A polygon may be missed if reading has dropped a triangle of it that had no area.
 
 use meshsnap_render::limits::{Budget, LimitExceeded};
 use meshsnap_render::mesh::Mesh;

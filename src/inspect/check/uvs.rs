@@ -1,7 +1,7 @@
-//! The two rules on texture coordinates. By `uv-in-range` they lie within the texture, from 0 to 1.
-//! By `uv-no-overlap` no two faces use the same part of the texture. Overlaps are looked for at the
-//! points of a grid of 1,024 on a side, as in the debug view `uv-layout`; an overlap that lies
-//! between these points is not found.
+//! The two rules on texture coordinates. By `uv-in-range` they lie within the texture, from 0 to 1. By
+//! `uv-no-overlap` no two faces use the same part of the texture. Overlaps are looked for at the points of a grid of
+//! 1,024 on a side, which spans all coordinates, as in the debug view `uv-layout`; an overlap that lies between these
+//! points is not found.
 
 use super::places::{self, Faults};
 use meshsnap_render::import::MeshError;

@@ -1,6 +1,6 @@
 //! Closed parts of a mesh that are inside out, for the rule `no-inverted-volume`: their faces look inwards, so their
-//! signed volume is negative. Such a part within the bounding box of a solid is taken for a cavity of that solid, and
-//! is no fault.
+//! signed volume is negative. Such a part within the bounding box of a solid (one of the 64 largest) is taken for a
+//! cavity of that solid, and is no fault.
 
 use super::places::{self, Faults};
 use meshsnap_render::limits::{Budget, LimitExceeded};

@@ -1,12 +1,11 @@
 //! The one-sided distance of a surface from another: over all its points, the largest and the mean
 //! distance to the nearest point of the other. The mean is that of samples.
 //!
-//! The largest is found by branch and bound. The distance to a single face of the other surface is
-//! convex, so over a triangle it is largest at a corner. That corner's distance is a bound for all
-//! points of the triangle. It is computed for the faces nearest to the three corners, and the
-//! smallest counts. A triangle whose bound is above the largest distance found so far is divided.
-//! Where the division ends, the difference of bound and largest distance is the error that the
-//! result states.
+//! The largest is found by branch and bound. The distance to a single face of the other surface is convex, so over a
+//! triangle it is largest at a corner. That corner's distance is a bound for all points of the triangle. It is
+//! computed for the faces nearest to the three corners, and the smallest counts. Triangles whose bound is above the
+//! largest distance found so far are divided, until the difference is small enough or there were too many divisions.
+//! The difference that is left is the error that the result states.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;

@@ -1,5 +1,6 @@
 //! The differences between two meshes: their surfaces, parts, faces, topology and materials, in numbers and in
-//! sentences as a reviewer would write them. Vertex order, face order and the format of the file do not count.
+//! sentences as a reviewer would write them. Vertex order, face order and the format of the file do not make two
+//! meshes different.
 //!
 //! A `Difference` is written as JSON, so the names of its fields are part of the public interface. Nothing here reads
 //! a file.

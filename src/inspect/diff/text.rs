@@ -1,12 +1,13 @@
 //! The difference between two meshes as text for a person: whether they are the same, the sentences of the summary,
-//! the largest and the mean distance, and a line for each further number that differs.
+//! the largest and the mean distance unless they are 0, and a line for each count, and for size, area and volume,
+//! that differs.
 
 use std::fmt::Write as _;
 
 use super::{Counts, Difference, Geometry, Size};
 
 impl Difference {
-    /// The summary, then a line for each number that differs.
+    /// The summary, the distance, then a line for each count and measure that differs.
     pub fn text(&self) -> String {
         let mut text = String::from(if self.same { "same\n" } else { "different\n" });
         for sentence in &self.summary {

@@ -1,6 +1,6 @@
 //! Vertices that two meshes have in common: each vertex of the second mesh gets the number of the vertex of the first
-//! mesh that lies at the same place, within a tolerance, or else a new number. A grid of small cubes finds the
-//! nearest vertex fast.
+//! mesh that lies at the same place, within a tolerance, or else a new number. A grid of small cubes makes the search
+//! fast.
 
 use rapidhash::RapidHashMap;
 

@@ -1,5 +1,6 @@
-//! The test whether a mesh is another one that was scaled by one factor and shifted as a whole, as by a change of the
-//! unit from millimetres to inches. Such a change can then be told in one sentence, and not as a change of each part.
+//! The test whether a mesh is another one that was scaled by one factor or shifted as a whole, or both, as by a
+//! change of the unit from millimetres to inches. Such a change can then be told in one sentence, and not as a change
+//! of each part.
 
 use super::faces::Faces;
 use super::frame::{Frame, diagonal};

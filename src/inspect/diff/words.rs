@@ -1,5 +1,5 @@
-//! Sentences on the differences between two meshes, as a reviewer would write them: "one part moved by (0, 0, 1)". They
-//! go from the most to the least important. Of a long list, five are written, and a last one counts the others.
+//! Sentences on the differences between two meshes, as a reviewer would write them: "one part moved by (0, 0, 1)".
+//! They go from the most to the least important. Of a long list, five are written, and a last one counts the others.
 
 use std::collections::BTreeMap;
 

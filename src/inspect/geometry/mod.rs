@@ -1,5 +1,5 @@
-//! Geometry of a mesh for reports, rules and comparisons, which drawing does not need: which faces intersect, how far
-//! surfaces are apart, how large area and volume are, how thick walls are, how a texture is laid out.
+//! Geometry of a mesh for reports, rules and comparisons: which faces intersect, how far surfaces are apart, how
+//! large area and volume are, how thick walls are, how a texture is laid out.
 
 pub mod charts;
 pub mod intersections;

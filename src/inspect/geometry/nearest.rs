@@ -1,5 +1,5 @@
-//! The distance from a point to the nearest face of a mesh, and the first face that a ray meets, by a tree of boxes
-//! (a bounding volume hierarchy).
+//! The distance from a point to the nearest face, line or point of a mesh, and along a ray to the first face that it
+//! meets, by a tree of boxes (a bounding volume hierarchy).
 //!
 //! Distances are computed in f64, in units of the mesh's unit box: the box of side 1 into which reading scales a
 //! mesh. Positions are stored as the mesh has them, in f32.

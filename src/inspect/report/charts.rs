@@ -1,5 +1,5 @@
 //! The section of a report on UV charts, the pieces into which a texture unfolds a surface: how much of the texture
-//! they use, how much they stretch it, and how much they overlap.
+//! they use, how much they stretch it, and how much their faces overlap.
 
 use serde::Serialize;
 

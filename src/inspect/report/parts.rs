@@ -1,7 +1,7 @@
-//! The section of a report on the connected parts of a mesh, each with its area and, if it is
-//! closed, its volume and genus, and on the mesh's loops. A loop is a set of connected edges that are
-//! all open (have one face) or all sharp (their two faces are turned by more than 30 degrees against
-//! each other).
+//! The section of a report on the connected parts of a mesh, each with figures such as its area and,
+//! if it is watertight, its volume, and on the mesh's loops. A loop is a set of connected edges that
+//! are all open (have one face) or all sharp (their two faces are turned by more than 30 degrees
+//! against each other). All are counted; the largest 50 of each kind are listed.
 
 use serde::Serialize;
 

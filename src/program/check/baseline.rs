@@ -1,6 +1,7 @@
 //! Baselines of `meshsnap check`: folders of accepted faults, which `--update` writes. A mesh with
-//! faults has a JSON file there; a fault that is in it, and has not grown, does not fail the mesh
-//! again. If views are asked for, the folder also has the accepted pictures of each mesh.
+//! faults has a JSON file there. A fault that is in it, with no larger number and (if all of its
+//! places were recorded) no new place, does not fail the mesh again. If views are asked for, the
+//! folder also has the accepted pictures of each mesh.
 
 use std::fs;
 use std::io::ErrorKind;

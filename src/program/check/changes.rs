@@ -1,5 +1,5 @@
-//! The changes of a mesh since a git commit (`meshsnap check --since`), as sentences in the words of `meshsnap diff`, and
-//! the mesh as it was in that commit, if it can be read: the report has pictures of it beside the new ones.
+//! The changes of a mesh since a git commit (`meshsnap check --since`), as sentences in the words of `meshsnap diff`,
+//! and the mesh as it was in that commit, if it can be read, for the pictures of before.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
 //! `meshsnap.toml`, the configuration of `meshsnap check` in a repository: the rules for all meshes, other rules for
-//! files that fit a glob, the folder of accepted faults, and the views of pictures in reports.
+//! files that fit a glob, the folder of accepted faults, and the views of pictures.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};

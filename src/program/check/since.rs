@@ -1,6 +1,6 @@
 //! `meshsnap check --since REF`: leaves out the meshes that have not changed since a git commit, and reads files as
-//! they were in that commit, both by the program `git`. A mesh also counts as changed if a file has changed that it
-//! names, such as a texture.
+//! they were in that commit, both by the program `git`. A mesh also counts as changed if a file that it names, such
+//! as a texture, is new or has changed in its folder or below.
 
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};

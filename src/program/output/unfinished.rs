@@ -1,5 +1,5 @@
-//! The list of the files that are being written, under their temporary names. If a signal ends the
-//! program, they are removed first, so that no unfinished file stays behind.
+//! The list of the files that are being written, under their temporary names. If the program is
+//! ended by SIGHUP, SIGINT or SIGTERM, or by Ctrl-C on systems other than Unix, they are removed first.
 
 use std::collections::BTreeSet;
 use std::io;

@@ -1,5 +1,5 @@
 //! `render MESH... -o FILE`: one picture of one mesh. Its files are read, the picture is drawn and written, and
-//! warnings are printed with what to do about them.
+//! warnings are printed; those about missing files say what to do if the files lie beside the mesh.
 
 use std::ffi::OsString;
 use std::sync::Arc;

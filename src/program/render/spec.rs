@@ -1,6 +1,6 @@
 //! The request of a picture (what it shows, and how it looks), put together from the request document in JSON, the
-//! short flags and `--set`; each overrides those before it. The error for a wrong value names the place where the
-//! user gave it.
+//! short flags and `--set`; each overrides those before it. The output's extension overrides the document's format.
+//! The error for a wrong value names the place where the user gave it.
 
 use std::path::Path;
 

@@ -1,9 +1,11 @@
-//! `render --watch`: draws again whenever a file that was read has changed.
+//! `render --watch`: draws again whenever a file has changed that the command names, that is in a
+//! folder it names, or that `--siblings` finds for a single picture. The pictures do not count, nor
+//! do hidden files in folders.
 //!
-//! A file counts as changed if its length or its time of modification is another. The program looks
-//! at all files once a second, or less often if there are so many that looking takes long.
-//! Notifications of the system make it look at once; there may be none, as on network file systems
-//! or with too many watches.
+//! A file counts as changed if its length or its time of modification is another, or if it comes or
+//! goes. The program looks at all files once a second, or less often if there are so many that
+//! looking takes long. Notifications of the system make it look sooner; there may be none, as on
+//! network file systems or with too many watches.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -1,6 +1,7 @@
 //! The rights that a process of the sandbox gives up before it reads a file: opening files, the network, other
-//! processes, new rights, and most system calls. The Linux kernel refuses them from then on, by Landlock and seccomp,
-//! as far as it has these. Its memory and its processor time are bounded, too.
+//! processes, new rights, and most system calls. From then on the Linux kernel refuses them, or ends the process that
+//! tries, by resource limits, Landlock and seccomp, as far as it has these. The memory and the processor time of the
+//! process are bounded, too.
 
 use std::io;
 

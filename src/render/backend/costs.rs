@@ -3,7 +3,8 @@
 //!
 //! An estimate is a formula of the plan's size (triangles, samples and edges), times a factor for the back-end and
 //! the kind of plan: with lines or without, with transparent layers or without. The factors are learnt from the time
-//! that earlier pictures took. Under load they contain how long jobs have to wait for each other.
+//! that earlier pictures took. Under load they contain how long jobs have to wait for each other. While one back-end
+//! draws, the factors of the other return to 1, so that it is tried again.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};

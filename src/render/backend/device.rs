@@ -1,5 +1,6 @@
-//! Types that describe a GPU to the code that chooses a back-end: a hint about the machine before a driver is loaded
-//! (`HardwareHint`), an opened device (the trait `GpuDevice`), and the status that reports show (`GpuStatus`).
+//! Types that describe a GPU, for the choice of a back-end and for reports: a hint about the machine before a driver
+//! is loaded (`HardwareHint`), an opened device (the trait `GpuDevice`), and the status that reports show
+//! (`GpuStatus`).
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;

@@ -1,4 +1,6 @@
-//! The duration of each stage of drawing, for reports.
+//! The duration of each part of drawing, for reports. The parts are the stages, and three steps of the CPU back-end:
+//! sorting into bands, colours of whole faces, rows to the encoder. Only peeling has no time of its own: it counts as
+//! visibility or shade.
 
 use std::time::Duration;
 

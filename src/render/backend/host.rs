@@ -1,5 +1,5 @@
-//! The owner of the process's one GPU device, which all workers share. The device is opened when a
-//! job first needs it, and opened again after it was lost.
+//! The owner of the process's one GPU device, which all workers share. The device is opened when it
+//! is first needed, and opened again after it was lost.
 //!
 //! Before a device draws with a number of samples per pixel for the first time, it has to draw a
 //! test picture with that number (`probe`). If it draws that wrong, this process uses no GPU any

@@ -7,14 +7,14 @@
 //! - occlusion finds how much less light hollows get (screen-space ambient occlusion).
 //! - peeling finds the transparent layers at each sample, from front to back (depth peeling).
 //! - shade computes colours (in `surface`).
-//! - mixed pixels, in or beside which faces of different colours meet, are drawn once more from many points each, if
-//!   samples are adaptive.
+//! - mixed pixels, such as those in which faces of different colours meet, are drawn once more from many points each,
+//!   if samples are adaptive.
 //! - lines draws edges over the colours.
 //! - resolve lays the colours over the background and makes bytes of them.
 //!
 //! A plan that has no use for a stage leaves it out.
 //!
-//! Each stage is written twice, in twins of the same name: `shaders/FOLDER/NAME.wgsl` and
+//! Each stage is written twice, in twins, mostly of the same name: `shaders/FOLDER/NAME.wgsl` and
 //! `src/render/backend/cpu/FOLDER/NAME.rs`. The module's tests compare the constants and structs that the two
 //! share. `select` chooses the back-end of a job, by `costs` while the GPU is busy. `host` owns the process's
 //! GPU, and [`probe`] checks a GPU before it is used.

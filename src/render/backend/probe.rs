@@ -1,9 +1,9 @@
 //! The test picture that a GPU has to draw before it is used with a number of samples per pixel. Every sample and
-//! every pixel of it is checked, so that a driver that computes wrong numbers is found before a client sees them.
+//! every pixel of it is checked, to find a driver that computes wrong numbers before a client sees them.
 //!
-//! The expected picture follows from a formula in this file, not from the other back-end. Depths are powers of two
-//! and edges keep away from sample positions, so rounding cannot change what a sample shows. A colour may be off by
-//! one step in 255.
+//! The expected picture follows from a formula in this file, not from the other back-end. Visible depths are powers
+//! of two and corners lie on multiples of 1/256 px, so rounding cannot change what a sample shows. A colour may be
+//! off by one step in 255.
 
 use super::{DrawError, Renderer};
 use crate::image::srgb8_thresholds;

@@ -1,6 +1,7 @@
-//! The legend of a picture whose colours stand for measured numbers, such as the lengths of edges. It is
+//! The legends of a picture whose colours stand for measured numbers, such as the lengths of edges. Each is
 //! a bar of the colours from the lowest number to the highest, with the numbers at both ends and the name
-//! of what is measured, in the lower right corner of the picture.
+//! of what is measured. They lie in the lower right corner of the picture, one above the other; those that
+//! it has no room for are left out.
 
 use super::{TEXT_HEIGHT, dot_px, fill, text_width_px, write};
 use crate::image::Image;

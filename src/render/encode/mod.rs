@@ -1,5 +1,5 @@
-//! Encoders: a finished [`Image`] to the bytes of a file. The same picture always gives the same
-//! bytes.
+//! Encoders: a finished [`Image`] to the bytes of a file. The same picture, format and effort always
+//! give the same bytes.
 
 mod png;
 mod webp;

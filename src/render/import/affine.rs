@@ -1,5 +1,5 @@
-//! Affine maps in f64 (a 3 x 3 matrix and a translation), by which a scene places its meshes. They
-//! are for the formats that have scenes: glTF, FBX and 3MF.
+//! Affine maps in f64 (a 3 x 3 matrix and a translation), by which a scene places its meshes and
+//! cameras. They are for the formats that have scenes: glTF, FBX and 3MF.
 
 use crate::mesh::vector::{cross, dot};
 

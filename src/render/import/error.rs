@@ -9,7 +9,7 @@ use crate::limits::{Exhausted, LimitExceeded, Stopped};
 /// file.
 pub const DETAIL_CHARS_MAX: usize = 1000;
 
-/// An import that failed. It is always the input's fault; the detail is safe to show to a client.
+/// An import that failed. It is the input's fault unless the job was stopped; the detail is safe to show to a client.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 #[error("{detail}")]

@@ -1,10 +1,9 @@
 //! The table of mesh formats: for each its names, its file extensions, the tests that recognise its
-//! bytes, and the function that reads it.
+//! bytes or its package, and the function that reads it.
 //!
-//! Everything that depends on the list of formats follows from this table: the recognition of
-//! files, the choice of the mesh in an upload, the request field `format_in`, the lists of formats
-//! in messages and help texts, the daemon's description of what it can do (capabilities), and the
-//! fuzz targets of formats.
+//! From this table follow the recognition of files, the choice of the mesh in an upload, the
+//! request field `format_in`, the lists of formats in messages and help texts, the daemon's
+//! description of what it can do (capabilities), and the fuzz targets of formats.
 
 use super::bundle::BundleFile;
 use super::context::Context;

@@ -1,7 +1,7 @@
 //! The interface to another process in which decoders written in C and C++ run (FBX,
 //! meshoptimizer), so that a hostile file that makes one crash there does no harm here. A program
-//! may set such a process up, as `meshsnap-cli` does with its sandbox. Without it these decoders
-//! run in this process.
+//! may set such a process up, as `meshsnap-cli` does with its sandbox on Linux. Without it these
+//! decoders run in this process.
 
 use std::sync::OnceLock;
 
@@ -50,12 +50,12 @@ pub enum IsolationError {
 
 static ISOLATION: OnceLock<Box<dyn Isolation>> = OnceLock::new();
 
-/// From now on, importers in C run there. The first call counts.
+/// From now on, decoders in C and C++ run there. The first call counts.
 pub fn isolate_in(isolation: Box<dyn Isolation>) {
     let _ = ISOLATION.set(isolation);
 }
 
-/// Where importers in C run; None: in this process.
+/// Where decoders in C and C++ run; None: in this process.
 pub fn isolation() -> Option<&'static dyn Isolation> {
     ISOLATION.get().map(Box::as_ref)
 }

@@ -1,6 +1,6 @@
-//! Texts that a mesh file says about itself (generator, first comment, names of glTF extensions),
-//! each made one line of at most 200 characters without control characters, which could move a
-//! terminal's cursor.
+//! Texts that a mesh file says about itself (such as generator, first comment, names of glTF
+//! extensions), each made one line of at most 200 characters without control characters, which
+//! could move a terminal's cursor.
 
 /// Most characters of a text in a report.
 const TEXT_CHARS_MAX: usize = 200;

@@ -1,7 +1,8 @@
 //! The splitting of polygons into triangles: convex quads along the shorter diagonal, others by ear
-//! clipping, and those of more than 8192 corners as fans, because the time of ear clipping grows
-//! with the square of the corners. Each triangle gets a mask of its edges that belong to the
-//! polygon; the others are diagonals, which a drawing of the edges leaves out.
+//! clipping. Those of more than 8192 corners become fans, because the time of ear clipping grows
+//! with the square of the corners, and so do those whose parts cancel out where they cross themselves.
+//! Each triangle gets a mask of its edges that belong to the polygon; the others are diagonals, which
+//! lines along the polygons' edges leave out.
 
 use crate::import::normalise::pow2::{Pow2, exponent, is_usable, max_abs};
 use crate::warning::Warning;

@@ -1,12 +1,12 @@
-//! The raw mesh: the form in which every importer delivers a mesh, as the file has it. `normalise`
-//! then turns it into the final `Mesh`.
+//! The raw mesh: the form in which every importer delivers a mesh, in the file's units and with
+//! polygons split into triangles. `normalise` then turns it into the final `Mesh`.
 
 use crate::import::ImportReport;
 use crate::mesh::material::{FileCamera, ImageSource};
 use crate::mesh::{LineOrPoint, MaterialSlot, UpAxis};
 use bytes::Bytes;
 
-/// A mesh as the file has it: file units, f64, nothing welded, nothing dropped.
+/// A mesh before it is normalised: in file units, nothing welded.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "isolate", derive(serde::Serialize, serde::Deserialize))]
 pub struct RawMesh {

@@ -1,4 +1,5 @@
-//! Text from files: UTF-16 is decoded, and names are cut to a length before they are kept or shown.
+//! Text from files: UTF-16 is decoded, numbers are parsed, and names and other libraries' error texts
+//! are cut to a length before they are kept or shown.
 
 use crate::limits::{Budget, LimitExceeded};
 use std::borrow::Cow;

@@ -1,8 +1,9 @@
 //! The warning `up_unlikely`: the axis that a format has pointing up by custom is most likely not the
 //! one that points up in this file.
 //!
-//! Only formats whose files may have either axis are looked at, and only clear evidence counts: a word
-//! of the program that wrote the file, or a tall shape with a flat base on the other axis alone.
+//! Only formats whose files may have either axis are looked at, and only clear evidence counts: the
+//! file's comment (it names the axis, or a program known for it), or a tall shape with a flat base on the
+//! other axis alone.
 
 use super::{Format, ImportReport};
 use crate::mesh::vector::{cross, dot, sub};

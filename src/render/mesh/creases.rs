@@ -1,7 +1,7 @@
 //! Vertex normals with creases, for smooth shading of meshes whose files have no normals. A crease is an
-//! edge whose faces' normals differ by more than a given angle. At a vertex on a crease, the faces on
-//! each side of it have a normal of their own, so that shading is smooth on either side and breaks at the
-//! edge.
+//! edge whose faces' normals differ by more than a given angle. At a vertex on a crease, faces that are
+//! connected through other edges share a normal, so that shading is smooth on either side of the crease
+//! and breaks at it.
 
 use rayon::prelude::*;
 

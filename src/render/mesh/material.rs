@@ -1,7 +1,6 @@
 //! Materials of a file, with their textures and images, and the file's cameras.
 //!
-//! Images stay encoded here. A picture decodes those whose texels it needs, so textures that are
-//! not shown cost no decoding.
+//! Images stay encoded here, so that a picture without textures costs no decoding.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! The [`Mesh`], the one form into which every importer turns its file, and what is computed from it:
+//! The [`Mesh`], the one form into which files of all formats are turned, and what is computed from it:
 //! [`normals`], [`creases`], [`edges`], [`topology`].
 //!
 //! **Invariant**: nothing in this folder, and nothing that works with a mesh later, depends on the file
@@ -68,7 +68,7 @@ pub struct Mesh {
     pub bounds: [[f32; 3]; 2],
     /// The way back to the file's space.
     pub to_file: ToFile,
-    /// The axis that points up in the format's convention.
+    /// The axis that points up, by the file or by the custom of its format.
     pub up: UpAxis,
 }
 

@@ -1,7 +1,7 @@
 //! Line segments and points of a file, which have no area.
 //!
 //! Where their material has a filled surface, they are drawn as small triangles that face the
-//! camera. Importers already count these triangles against the limit of triangles.
+//! camera. On import these triangles already count against the limit of triangles.
 
 /// The number of triangles that a segment is drawn as.
 pub const SEGMENT_TRIANGLES: u64 = 2;

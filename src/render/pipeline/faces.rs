@@ -1,6 +1,6 @@
-//! The face of the mesh that each pixel of a picture shows, and its distance from the eye. Programs
-//! that use the library need both to draw something over a picture themselves. The CPU back-end
-//! finds them, whichever back-end draws the picture.
+//! The opaque face of the mesh that each pixel of a picture shows at its centre, and its distance along
+//! the direction of view. Programs that use the library need both to draw something over a picture
+//! themselves. The CPU back-end finds them, whichever back-end draws the picture.
 
 use super::{Context, RenderError, Stage, Staged, View, with_scene};
 use crate::backend::Renderer as _;

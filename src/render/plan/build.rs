@@ -1,7 +1,8 @@
 //! The making of a plan, the list of all that a back-end draws for one picture, from a scene (a
 //! mesh, a request and the placed camera). Other modules of this folder make the parts of the plan.
-//! They are called here in their order: triangles, lines, the surface, occlusion, the margin, the
-//! ground's shadow, the outline, and transparent layers. What the scene does not need is left out.
+//! They are called here in their order: triangles, colours of diagnostics, lines, the surface,
+//! occlusion, samples, the margin, the ground's shadow, the outline, and transparent layers. What the
+//! scene does not need is left out.
 
 use super::context::PlanContext;
 use super::peeling::{needed_pass, pass_masks, peeling_pass};

@@ -32,7 +32,7 @@ pub struct PlanContext<'c> {
     pub skips: Skips<'c>,
     /// Warnings of parts that the picture lacks, and why.
     pub warnings: Vec<Warning>,
-    /// Chains of outlines that are left out because they are short.
+    /// Chains of feature edges and outlines that are left out because they are short.
     pub short_chains: u32,
     /// True if an edge that may be drawn has more than two faces.
     pub has_crowded_edges: bool,

@@ -1,7 +1,7 @@
-//! The memory that a plan, and the back-end that draws it, will take. It is computed from the
-//! numbers of pixels, vertices and triangles, and taken from the job's budget before it is
-//! allocated. If the budget does not suffice, the picture is refused. Lines are not in it: `lines`
-//! spends theirs.
+//! The memory that a plan's pixels, vertices, triangles and materials take, in the plan and in the
+//! back-end that draws it. It is computed from their numbers, and taken from the job's budget before
+//! it is allocated. If the budget does not suffice, the picture is refused. Other parts, such as
+//! lines, spend theirs themselves.
 
 use super::HullPass;
 use super::geometry::Geometry;

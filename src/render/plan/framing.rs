@@ -1,6 +1,6 @@
 //! The positions of the mesh to which the camera is fitted. These are all positions, except those that
 //! belong only to faces on which a texture's alpha mask shows nothing: invisible faces must not make the
-//! visible ones small.
+//! visible ones small. If the picture does not show the mask, or nothing is visible, all positions count.
 
 use super::PlanError;
 use super::cut_outs::{CutOuts, masked};

@@ -1,12 +1,12 @@
 //! The margin: the pixels beyond the picture's border for which visibility samples are taken, too.
 //! These say which face is visible there; nothing is drawn. Whether a plan has a margin is decided
-//! here: it has none where the whole mesh lies inside the picture.
+//! here: it has none where nothing needs it, or where the whole mesh lies inside the picture.
 //!
 //! A line covers pixels on both sides of its edge, so a pixel at the picture's border may belong to
 //! a line whose edge lies beyond it. Only samples there tell whether a face hides that edge. With
 //! them, lines at the border look as they would in the middle of a larger picture. Adaptive
-//! samples, for which a pixel is compared with its neighbours, need a margin, too. How wide it has
-//! to be follows from the lines, and `build` passes it on.
+//! samples, for which a pixel is compared with its neighbours, need a margin, too. `build` passes on
+//! how wide it has to be for both; a margin is at least 8 pixels wide.
 
 use super::DrawPlan;
 use super::context::{CHECK_EVERY, PlanContext};

@@ -6,8 +6,8 @@
 //! `surface`, `outline` (hulls) and `peeling` (transparent layers). Where a request has a quality
 //! target, `quality` first chooses the values that the request leaves open.
 //!
-//! Invariant: everything that a scene does not need is left out here, and each omission is written
-//! down in [`DrawPlan::skips`].
+//! Invariant: work that a scene does not need is left out here, and [`DrawPlan::skips`] lists the
+//! kinds of work that are left out.
 
 mod build;
 mod context;

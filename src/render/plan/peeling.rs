@@ -1,7 +1,7 @@
-//! Depth peeling, as a plan describes it. Transparent surfaces are drawn by it in layers: at each sample
-//! the nearest one is found first, then the next behind it, and so on. It is decided here which pictures
-//! need such layers, and for each triangle whether it belongs to the layers, to the opaque surface, or to
-//! both.
+//! Depth peeling, as a plan describes it. Transparent surfaces, the ground's shadow and some wires are
+//! drawn by it in layers: at each sample the nearest one is found first, then the next behind it, and
+//! so on, at most 16. It is decided here which pictures need such layers, and for each triangle whether
+//! it belongs to the layers, to the opaque surface, to both, or to neither.
 
 use std::borrow::Cow;
 

@@ -1,5 +1,6 @@
-//! Facts about a mesh that more than one picture of it needs, such as its edges. A fact is kept when a
-//! plan has found it, and later plans of the mesh take it.
+//! Facts about a mesh that more than one picture of it needs, such as its edges. What a plan has found
+//! is kept for later plans of the mesh: vertex normals until a plan needs others, and decoded images as
+//! long as there is room for them.
 //!
 //! Invariant: what is kept changes no byte of a picture, no skip (work that a plan leaves out) and no
 //! refusal. So a plan that takes a fact also takes from its job's budget the memory that finding the fact

@@ -1,7 +1,7 @@
 //! The projection of a picture: four row vectors that turn a position into its place on screen, its
-//! depth, and its distance in front of the eye. `Projection` has them in f32, and back-ends draw by it.
-//! `Projector` has the same rows in f64: by it the plan finds what lies where on screen, and what lies
-//! before the near plane.
+//! depth, and W, its distance in front of the eye (1 in an orthographic view). `Projection` has them in
+//! f32, and back-ends draw by it. `Projector` has the same rows in f64: most parts of the plan find by
+//! it what lies where on screen, and what lies before the near plane.
 
 use crate::scene::camera::Camera;
 

@@ -1,6 +1,6 @@
-//! The reading of one item of a request, which is a key and its value. The value is checked and put into
-//! the draft, which collects what all items say. If it is wrong, the result is an error whose sentence
-//! says what is allowed.
+//! The reading of one item of a request, which is a key and its value. The value is checked and put
+//! into the draft, which collects what all items say. If the key is unknown or the value wrong, the
+//! result is an error whose sentence says what is allowed.
 
 use crate::limits::IMAGE_PX_MAX;
 use crate::request::Rules;

@@ -1,6 +1,6 @@
-//! The draft of a [`Spec`], which collects what a request says. It begins with the defaults, and each key
-//! that is read changes it. Defaults that depend on other keys, and conflicts between keys, are settled
-//! at the end, when every key is known.
+//! The draft of a [`Spec`], which collects what a request says. It begins with the defaults and the
+//! layers of the style, and each key that is read changes it. At the end, when every key is known,
+//! defaults that depend on other keys are settled, and keys that contradict each other are refused.
 
 use super::error::{RequestError, RequestFault};
 use crate::request::Rules;

@@ -1,5 +1,5 @@
-//! Errors of requests. Each is one sentence that names the key, the given value and the allowed
-//! ones.
+//! Errors of requests. Each is one sentence for the client. Most name the key, the given value and the
+//! allowed ones.
 
 use std::fmt;
 

@@ -1,6 +1,6 @@
 //! The draft of [`Layers`] (surface, wire, outline), which collects what a request says about them. It
-//! begins with the layers of a style. The keys of the document change it, and each material of the
-//! document changes a copy. Defaults that depend on other keys are settled at the end.
+//! begins with the layers of a style. The keys of the request change it, and those of each material
+//! change a copy. Defaults that depend on other keys are settled at the end.
 
 use super::error::{RequestError, RequestFault};
 use crate::request::style::Style;

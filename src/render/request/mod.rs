@@ -3,7 +3,8 @@
 //!
 //! Each of these overrides what precedes it: defaults, the style, the document, the dotted keys of a
 //! query or of `--set`. Materials begin from the document's own layers, as they are after all of these.
-//! `null` turns a layer off; for any other key `null` is its default, or the same as leaving the key out.
+//! `null` turns a layer or the sheet off. For any other key it is the same as leaving the key out of
+//! its object, unless the key's description says otherwise (`surface.color`: the file's colours).
 //! [`table`] is the table of keys, from which [`schema()`] follows.
 
 mod apply;

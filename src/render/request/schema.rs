@@ -1,12 +1,11 @@
 //! The JSON Schema (draft 2020-12) of request documents, written from the table of keys.
 //!
-//! It states what the reader checks, with these exceptions: the length and the depth of the
-//! document; a key is not given twice, nor a short name and its key; the places where a document
-//! may name its mesh; `eye` and `target` differ; a sheet has views or a turntable, not both, it
-//! excludes some keys of the camera, and its cells and frames have limits of size; `uv-layout` is
-//! not for materials alone; the hulls of several materials share a unit, and their barycentric
-//! wires share `hidden`; the number of line styles; limits of a material's key that depend on keys
-//! of the document.
+//! It states what the reader checks, with these exceptions: the length and the depth of the document; a
+//! key is not given twice, nor a short name and its key; the places where a document may name its mesh;
+//! `eye` and `target` differ; a sheet has views or a turntable, not both, it excludes some keys of the
+//! camera, and its cells and frames have limits of size; `uv-layout` is not for materials alone; the
+//! hulls of several materials share a unit, and their barycentric wires share `hidden`; the number of
+//! line styles; limits of a key that depend on the style or, for a material, on keys of the document.
 
 use serde_json::{Map, Value as Json, json};
 

@@ -1,4 +1,4 @@
-//! The draft of a [`Sheet`] (several views in one picture), which collects what a request says about it.
+//! The draft of a [`Sheet`] (several views of a mesh), which collects what a request says about it.
 //! When every key is known, it is checked whether the sheet goes with the camera and with the picture's
 //! size.
 

@@ -1,6 +1,6 @@
-//! The styles that a request can name, such as `wire` or `clay`. A style is a preset, which the
-//! other keys of the request override. It says which layers of a picture are drawn and how
-//! (`layers_draft` has that), and how much ambient light and ambient occlusion there is by default.
+//! The styles that a request can name, such as `wire` or `clay`. A style is a preset, which the other
+//! keys of the request override. It says which layers of a picture are drawn and how (`layers_draft`
+//! and `draft` have that), and how much ambient light and ambient occlusion there is by default.
 
 use crate::spec::words::word_enums;
 

@@ -1,6 +1,7 @@
-//! The space that outlines, lines and points take around a mesh. The camera is fitted to the mesh
-//! and this space, so that the picture does not cut them off. The reach of the ground's shadow is
-//! added apart: it does not make the picture wider, but the camera's depth range has room for it.
+//! The space that outlines, lines and points take around a mesh. Where the camera is fitted to the
+//! mesh, it is fitted to this space, too, so that the picture does not cut them off. The reach of the
+//! ground's shadow is added apart: it does not make the picture wider, but the camera's depth range has
+//! room for it.
 
 use super::camera::Border;
 use super::ground::ground_distance;

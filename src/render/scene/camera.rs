@@ -1,7 +1,8 @@
 //! The camera of a picture: position, direction and lens, as the request asks for them and fitted to the
 //! mesh where it leaves them open. All is computed in f64.
 //!
-//! Fitting is exact: the frame touches the projected mesh itself, not its bounding sphere. Let t be the
+//! Fitting is exact: the frame, less its free border, touches the projected mesh itself, not its
+//! bounding sphere (for a turntable, all turns of the mesh together). In perspective, let t be the
 //! slope of a plane of the view pyramid. A vertex (x, y, z) in camera axes (z towards the viewer) is
 //! inside where `x + t z <= t d + cx`. The largest left-hand side on each of the four planes gives
 //! distance d and centre cx in closed form.

@@ -1,7 +1,7 @@
 //! The bounds of a mesh as a camera sees it, to which the camera is fitted: the least and the largest
-//! coordinates along the camera's axes, and the farthest vertices towards the four sides of the view
+//! coordinates along the camera's axes, and how far vertices reach towards the four sides of the view
 //! pyramid. For a single view, blocks of vertices that cannot change the result are left out. For a
-//! turntable, the bounds are those of all its turns together.
+//! turntable, the bounds are those of a whole turn.
 
 use glam::{DVec2, DVec3};
 

@@ -1,5 +1,5 @@
 //! Sheets: several views of one mesh in one picture. A [`Layout`] says where each view is, [`Canvas`]
-//! puts the drawn views together and writes their names.
+//! puts the drawn views together and can write their names.
 //!
 //! The size that a request gives is that of the whole sheet. Its cells (one for each view, and maybe
 //! empty ones in the last row) divide all of it: no pixel is left over, and the cells of a row differ in

@@ -1,5 +1,5 @@
-//! The colours of a request. Documents and files have them in sRGB, such as `#f00`; [`Rgba`] holds
-//! them in linear light, in which the program computes.
+//! The colours of a request. Documents have them in sRGB, such as `#f00`; [`Rgba`] holds them in linear
+//! light, in which the program computes.
 
 use crate::srgb::srgb_to_linear;
 

@@ -1,4 +1,4 @@
-//! Size, format, sampling and background of the picture, as a request describes them.
+//! The picture, as a request describes it: size, format, sampling, background, compression and legend.
 
 use super::background::Background;
 use super::color::Rgba;

@@ -1,6 +1,6 @@
-//! The quality target of a request: a largest error, a longest time, or both, in place of drawing
-//! techniques. The plan then chooses the techniques that the request leaves open (the number of
-//! samples, the method of wires, the back-end) so as to reach it.
+//! The quality target of a request: a largest error, a longest time, or both. The plan then chooses
+//! what the request leaves open of the number of samples, the method of wires and the back-end, so as
+//! to reach it.
 
 /// The largest error, the longest time, or both. The plan chooses what the request leaves open, so
 /// as to reach them.

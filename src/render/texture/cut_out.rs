@@ -1,12 +1,12 @@
 //! Cut-out textures: the distance of each texel from the border between what is drawn and what is
 //! left out.
 //!
-//! Only texels whose alpha reaches the material's cutoff are drawn, such as those of a leaf. A
-//! pixel's coverage is the share of it that is drawn. If texels are larger than pixels, this share
-//! follows from the distance to the border and the size of the pixel. If texels are smaller, it is
-//! the mean of the texels' coverages, which the mip levels hold.
+//! Only texels whose alpha reaches the material's cutoff are drawn, such as those of a leaf. A pixel's
+//! coverage is the share of it that is drawn. If texels are larger than pixels, this share follows from
+//! the distance to the border and the size of the pixel. If texels are smaller, it is the mean of the
+//! texels' coverages, which the coarser mip levels hold.
 //!
-//! The levels do not hold the mean of alpha, because its contrast falls from level to level: leaves
+//! These levels do not hold the mean of alpha, because its contrast falls from level to level: leaves
 //! and lattices would vanish, or close up.
 
 use rayon::prelude::*;

@@ -1,7 +1,7 @@
-//! The decoded images of one mesh, kept in memory from picture to picture, so that they are not
-//! decoded again. Images are kept one by one, since the pictures of a mesh may sample different
-//! ones. Where they take too much memory, the least recently used go first. Pictures that sample
-//! the same images get them as one shared object, by which the GPU back-end knows that it has them
+//! The decoded images of one mesh, kept in memory from picture to picture, so that they are not decoded
+//! again. Images are kept one by one, since the pictures of a mesh may sample different ones. Where
+//! they take too much memory, the least recently used go first. The sets of images that the last
+//! pictures sampled are kept as shared objects, by which the GPU back-end knows that it has them
 //! already.
 
 use std::collections::BTreeMap;

@@ -1,5 +1,5 @@
-//! A test whether this machine can have a hardware GPU. It looks at the device nodes under `/dev` (Linux only; elsewhere
-//! the answer is yes), so that no driver is loaded for it.
+//! A test whether this machine can have a hardware GPU. On Linux it looks at the device nodes under `/dev`, so that
+//! no driver is loaded for it. Elsewhere, and where they cannot be listed, the answer is yes.
 
 use std::path::Path;
 

@@ -1,5 +1,6 @@
-//! The memory that this process may use by default: three quarters of its container's limit, or
-//! else half of the machine's memory.
+//! The memory that this process may use by default: three quarters of its container's limit (if that is
+//! less than the machine has), or else half of the machine's memory. If neither is known, as on other
+//! systems than Linux, it is 4 GiB. It is at least 64 MiB.
 
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
-//! The table of settings: one row for each, with its key, its help, the values it allows and the field of `Config` that
-//! it sets.
+//! The table of settings: one row for each, with its key, its help, the values it allows and the field of `Config`
+//! that it sets.
 
 use std::path::PathBuf;
 

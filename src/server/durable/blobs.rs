@@ -1,5 +1,5 @@
-//! The files of the data folder, for bytes that are too large for its database (`log`), such as meshes and pictures.
-//! Each file is named by the SHA-256 of its bytes.
+//! The files beside the database of the data folder (`log`), for bytes that are too large for it, such as meshes and
+//! pictures. Each file is named by the SHA-256 of its bytes.
 
 use std::io;
 use std::path::{Path, PathBuf};

@@ -1,9 +1,8 @@
 //! The thread that writes the database of the data folder (`log`), and removes stored bytes that no record needs any
 //! more.
 //!
-//! Changes that arrive while the disk works are written together in the next transaction (group commit). One sync of
-//! the disk then stores the changes of many jobs, so that slow syncs hardly limit how many jobs are accepted per
-//! second.
+//! Changes that arrive while the disk works are written together in the next transaction (group commit). Its syncs of
+//! the disk then store the changes of many jobs, and hardly limit how many jobs are accepted per second.
 
 use std::collections::HashSet;
 use std::sync::Arc;

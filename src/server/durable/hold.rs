@@ -1,6 +1,6 @@
-//! Holds: counted references to bytes in the data folder, which are named by their SHA-256. The
-//! records of jobs and meshes that need the same bytes share one hold. When its last reference is
-//! dropped, the thread `committer` removes the bytes.
+//! Holds: counted references to bytes in the data folder, which are named by their SHA-256. The records
+//! of jobs and meshes that need the same bytes share one hold. When its last reference is dropped, the
+//! thread `committer` removes the bytes, unless they are held anew by then.
 //!
 //! `Index` finds the hold that exists for given bytes, so that equal bytes are stored once.
 

@@ -1,11 +1,11 @@
 //! The database of the data folder (redb, a key-value store). The code calls it the log, after the
 //! trait `Log`. It keeps the records of jobs and of stored meshes. These name bytes: mesh files,
-//! pictures, request documents, mesh reports. Small ones are kept in the database, too; larger ones
-//! are files (`blobs`).
+//! results, request documents, mesh reports. Small ones are kept in the database, too; larger ones are
+//! files (`blobs`).
 //!
-//! Changes are made in transactions, each whole or not at all. The thread `committer` writes them.
-//! When the server starts, it reads the database to restore jobs and meshes, and removes bytes that
-//! no record names.
+//! Changes are made in transactions, each whole or not at all. The thread `committer` writes them. When
+//! the server starts, it reads the database to restore jobs and meshes, and removes bytes that no
+//! record needs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;

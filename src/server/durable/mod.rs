@@ -5,8 +5,8 @@
 //! transaction. A [`Hold`] is a counted reference of records to bytes: when the last one is dropped, the bytes are
 //! removed.
 //!
-//! Architecture invariants: what [`Durable::store`] has answered with Ok survives a crash at any instant. Nothing here
-//! knows what a job does, nor HTTP.
+//! Architecture invariants: what [`Durable::store`] has answered with Ok survives a crash at any instant. Nothing
+//! here depends on what a job does, nor on HTTP.
 
 mod blobs;
 mod committer;

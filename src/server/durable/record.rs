@@ -1,7 +1,6 @@
-//! The records in the database of the data folder (jobs, their ends, stored meshes), and the
-//! changes that a transaction makes to them. The records are stored as JSON, which is thus the
-//! format of the data folder: a new field has a default, and no field changes its meaning. So a
-//! later version can read the folders of earlier ones.
+//! The records in the database of the data folder (jobs, their ends, stored meshes), and the changes
+//! that a transaction makes to them. The records are stored as JSON. A new field has a default, and no
+//! field changes its meaning, so that a later version can read the folders of earlier ones.
 
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};

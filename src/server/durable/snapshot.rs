@@ -1,9 +1,10 @@
-//! Reads the jobs and meshes of a data folder that a server may be using, for `meshsnap jobs`. It
+//! A reader of the jobs and meshes of a data folder that a server may be using, for `meshsnap jobs`. It
 //! changes nothing in the folder.
 //!
-//! Only one process can open a redb database. So `read` copies the database into memory, and opens
-//! the copy. The server may write meanwhile, so a copy can mix several states of the database. redb
-//! checks every page of the copy. If it finds a mix, the database is copied anew, for at most 10 s.
+//! While the server has its database open, no other process can open it. So `read` copies the database
+//! into memory, and opens the copy. The server may write meanwhile, so a copy can mix several states of
+//! the database. redb checks the pages of the copy. If it finds a mix, the database is copied anew, for
+//! about 10 s.
 
 use std::fs::File;
 use std::io::{self, Read as _};

@@ -1,5 +1,5 @@
-//! URLs at which pictures of stored meshes can be fetched again, and their `ETag`s. A tag is a digest of all that decides
-//! the picture, so that it is known before anything is drawn.
+//! URLs at which pictures of stored meshes can be fetched again, and their `ETag`s. A tag is a digest of all that
+//! decides the picture, so that it is known before anything is drawn.
 
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 

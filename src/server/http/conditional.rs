@@ -1,8 +1,8 @@
-//! The headers of HTTP caching: `ETag` and `Cache-Control` of answers, and the comparison of
-//! `If-None-Match` with a tag.
+//! Headers of HTTP caching: `ETag`, the `Cache-Control` of answers that are kept for a day, and the
+//! comparison of `If-None-Match` with a tag.
 //!
-//! They are written by hand: the crate `headers` would save two lines, and bring older versions of
-//! base64 and SHA-1 with it.
+//! They are written by hand: the crate `headers` would save little, and bring SHA-1 and an older
+//! version of base64 with it.
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 

@@ -4,9 +4,9 @@
 //! An [`ApiError`] becomes an answer in two steps: status and headers here, the body in
 //! [`super::middleware::observe`], because an `ApiError` does not know the id of its request, which is in the body.
 //!
-//! Two statuses of 400 or more are set elsewhere. The 422 of a failed verdict is an answer and no
-//! error: `resources/responses.rs` sets it. `connection/accept.rs` sends the 503 for a connection
-//! too many, because such a connection passes no middleware.
+//! Some statuses of 400 or more are set elsewhere. The 422 of a failed verdict is an answer and no error:
+//! `resources/responses.rs` sets it. `connection/accept.rs` sends the 503 for a connection too many, because such a
+//! connection passes no middleware. axum and hyper refuse some requests by themselves (405, 431).
 
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};

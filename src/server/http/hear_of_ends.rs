@@ -1,5 +1,5 @@
-//! The connection between jobs and webhooks: it starts the sender of webhooks by the settings, and writes the message that
-//! a webhook gets at the end of a job, which is the JSON of the job's state.
+//! The connection between jobs and webhooks: it starts the sender of webhooks by the settings, and writes the message
+//! that a webhook gets at the end of a job, with the JSON of the job's state.
 
 use std::sync::Arc;
 use std::time::Duration;

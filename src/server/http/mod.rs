@@ -8,12 +8,11 @@
 //! 4. [`receive`] reads the query and the body within their limits.
 //! 5. [`dto`] defines the JSON of answers, and [`error`] maps errors to statuses.
 //!
-//! [`recovery`] takes over what an earlier process has left in the data folder. [`negotiate`] and
-//! [`conditional`] read and write single headers. [`stored_mesh`] finds stored meshes for the
-//! handlers, and [`address`] makes the URLs and tags of their pictures. [`event_streams`] counts
-//! the clients that follow jobs, [`hear_of_ends`] tells webhooks of the ends of jobs.
-//! [`static_document`] answers with a document that does not change; [`descriptions`] makes two of
-//! them. `signals` waits for the signals that end the server or make it read its keys again.
+//! [`recovery`] takes over what an earlier process has left in the data folder. [`negotiate`] and [`conditional`]
+//! read and write single headers. [`stored_mesh`] finds stored meshes for the handlers, and [`address`] makes the
+//! URLs and tags of their pictures. [`event_streams`] counts the event streams of each client, [`hear_of_ends`] tells
+//! webhooks of the ends of jobs. [`static_document`] answers with a document that does not change; [`descriptions`]
+//! makes two of them. `signals` waits for the signals that end the server or make it read its keys again.
 //!
 //! Architecture invariant: axum and hyper are used nowhere else.
 

@@ -1,5 +1,6 @@
-//! The take-over of what an earlier process has left in the data folder: its stored meshes, its jobs that have not ended
-//! (they are queued again), and the results of those that have.
+//! The take-over of what an earlier process has left in the data folder: its stored meshes, its jobs that have not
+//! ended (they are queued again, except those that were begun five times or cannot be read any more), and the results
+//! of those that have.
 
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
-//! The owner of a job and its class, by which the queue decides what is next. The owner is an API key, or the client's
-//! address where there are no keys. The class is interactive (a client waits for the answer) or batch (it is fetched
-//! later).
+//! The owner of a job and its class, by which the queue decides what is next. The owner is an API key, or the
+//! client's address (of IPv6, its network) where there are no keys. The class is interactive (a client waits for the
+//! answer) or batch (it is fetched later).
 
 use std::fmt;
 use std::sync::Arc;

@@ -1,10 +1,10 @@
 //! Estimates of the time and the memory that jobs take, learnt from earlier jobs.
 //!
-//! An estimate is a formula of the job's size (bytes that are to be read, and samples that are to
-//! be drawn), times a factor. There is a factor for each kind of job: its task, its back-end, and
-//! whether its mesh was drawn before. For the time, there is also a factor for each pair of a kind
-//! of job and a stored mesh that was drawn before: such a mesh is asked for again and again, and
-//! its size in bytes says little about what it takes.
+//! An estimate is a formula of the job's size (bytes that are to be read, views, and samples that are to be drawn),
+//! times a factor. There is a factor for each kind of job: its task, its back-end, and whether its mesh is known. A
+//! stored mesh is known after a job of the same task, back-end and number of views. Its time then has a factor of its
+//! own in place of the kind's: such a mesh is asked for again and again, and its size in bytes says little about what
+//! it takes.
 
 use std::hash::{BuildHasher as _, RandomState};
 use std::sync::{Mutex, PoisonError};

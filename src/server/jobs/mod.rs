@@ -1,14 +1,14 @@
 //! Jobs: a bounded queue, worker threads that each own a renderer, and the results. A job draws a
 //! picture, judges a mesh, compares two, or writes the report on one.
 //!
-//! Architecture invariants: a full queue refuses at once and never waits. An accepted job is never
-//! dropped before its end. A panic costs its job alone. Nothing here knows HTTP.
+//! Architecture invariants: a full queue refuses at once and never waits. While the process runs, an accepted job is
+//! never dropped before its end. A panic costs its job alone. Nothing here knows HTTP.
 //!
-//! Reading order: [`job`] (one job and its states), `class` (its owner, and whether a client waits for it), [`claims`]
-//! (names of requests), [`progress`] (how far it has come), [`queue`] (those that wait), [`registry`] (all jobs, behind one
-//! lock), [`dispatch`] (the hand-over to workers), [`results`] (those that have ended), [`storage`] (jobs in the data
-//! folder), [`estimates`] (how long jobs will take), [`worker`] (does the jobs), [`clock`] (ends jobs whose time is up),
-//! [`watchdog`] (workers that do not end them).
+//! Reading order: [`job`] (one job and its states), `class` (its owner, and whether a client waits for it),
+//! [`claims`] (names of requests), [`progress`] (how far it has come), [`queue`] (those that wait), [`registry`] (all
+//! jobs, behind one lock), [`dispatch`] (the hand-over to workers), [`results`] (those that have ended), [`storage`]
+//! (jobs in the data folder), [`estimates`] (time and memory that jobs will take), [`worker`] (does the jobs),
+//! [`clock`] (ends jobs whose time is up), [`watchdog`] (workers that do not end them).
 
 mod claims;
 mod class;

@@ -3,9 +3,9 @@
 //! Two classes wait apart: interactive jobs, for which a client waits, and batch jobs, which are fetched later.
 //! Interactive ones go first, but a batch job is taken after a few of them, so that neither starves.
 //!
-//! Within a class the owners (API keys or addresses) take turns by the time that their jobs take (start-time fair
-//! queueing). So the jobs of others do not wait for all of the thousand jobs that one client sends. Among the jobs of one
-//! owner, that of the lowest rank is first: `registry.rs` gives low ranks to jobs that came early or are short.
+//! Within a class the owners (API keys or addresses) take turns by the estimated time of their jobs (start-time fair
+//! queueing). So the jobs of others do not wait for all of the thousand jobs that one client sends. Among the jobs of
+//! one owner, that of the lowest rank is first: `registry.rs` gives low ranks to jobs that came early or are short.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

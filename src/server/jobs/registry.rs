@@ -9,9 +9,9 @@
 //! it has waited. A job that would wait for too long is refused when it comes. The refusal says after how many seconds to
 //! try again.
 //!
-//! Short jobs overtake long ones of the same owner: a job ranks as if it had been accepted later by [`PATIENCE`]
-//! times its estimate, at most a quarter of the time that a job may take. So what is accepted later than that
-//! cannot overtake it. Batch jobs leave one worker free for interactive ones, where there are several.
+//! Short jobs overtake long ones of the same owner and class: a job ranks as if it had been accepted later by
+//! [`PATIENCE`] times its estimate, at most a quarter of the time that a job may take. So what is accepted later than
+//! that cannot overtake it. Where there are several workers, batch jobs leave one of them to interactive jobs.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

@@ -1,8 +1,8 @@
 //! The jobs that have ended and can still be found, by the time at which they expire.
 //!
-//! A result that was not fetched stays for `unfetched_ttl`, a fetched one for `result_ttl`. If there are too many results,
-//! or too many bytes of them, some go sooner: first those that were fetched, then the oldest of the owner that has the
-//! most.
+//! A result that was not fetched stays for `unfetched_ttl`, a fetched one for `result_ttl`. If there are too many
+//! results, or too many bytes of them, some go sooner: first those that were fetched, then the oldest of the owner
+//! that has the most. The last one stays, however large.
 
 use std::collections::{BTreeMap, HashMap};
 use std::time::{Duration, Instant};

@@ -5,8 +5,8 @@
 //! number of stuck ones is more than twice that of workers in the settings. If its job ends after
 //! all, the worker ends itself, or goes on in the place of a stuck one that was not replaced.
 //!
-//! A mesh that has kept a worker busy in this way twice is refused from then on. The last 1024
-//! meshes that have done so at least once are remembered, until the server ends.
+//! A mesh that has kept a worker busy in this way twice is refused from then on. Of a comparison, only the older mesh
+//! is counted. The last 1024 meshes that have done so at least once are remembered, until the server ends.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -1,4 +1,5 @@
-//! The file of named keys, in TOML: a table `[[keys]]` for each, with its name, the SHA-256 of the key, and its scopes.
+//! The file of named keys, in TOML: a table `[[keys]]` for each, with its name, the SHA-256 of the key, and its
+//! scopes (`render` and `store` where none are given).
 
 use std::collections::HashSet;
 use std::fs::File;

@@ -1,8 +1,8 @@
 //! API keys: who may do what. Keys without a name come from a setting, named ones from a file ([`mod@file`]), which is
 //! read again on SIGHUP. The key of a request is looked up by its digest.
 //!
-//! Architecture invariant: a file that cannot be read changes nothing, so that no mistake opens the server or locks
-//! everybody out.
+//! Architecture invariant: a missing or faulty file prevents the start, and later changes nothing. So such a mistake
+//! neither opens the server nor locks everybody out.
 
 mod file;
 

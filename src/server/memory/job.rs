@@ -1,6 +1,6 @@
-//! The memory of one running job: what it has borrowed from the budget of the process, and the most
-//! that it held. A job that asks for more in vain fails. Its worker then gives all of the memory
-//! back and queues the job again, so that no job waits for memory while it holds some.
+//! The memory of one running job: what it has borrowed from the budget of the process, and the most that it held. A
+//! job that asks for more than one job may take fails for good. If others have what it asks for, its worker gives all
+//! of the memory back and queues the job again, so that no job waits for memory while it holds some.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,9 +1,9 @@
 //! The memory of the process, in bytes: one budget that jobs, uploads, stored meshes, caches, results and unsent answers
 //! draw from, each on an account of its own.
 //!
-//! A part is kept for jobs: the other accounts together are granted no more than the rest, so that a job finds memory once
-//! the running jobs have ended. Caches shrink before a request for memory is refused. What exists already, such as an
-//! answer, is counted even beyond these limits.
+//! A part is kept for jobs: the other accounts together are granted no more than the rest, so that a job finds memory
+//! once the running jobs have ended. Where the process lacks memory, caches shrink before a request for it is
+//! refused. What exists already, such as an answer, is counted even beyond these limits.
 //!
 //! Invariant: the lock is held for sums alone. Nothing waits for memory while it holds a lock; a job that waits for
 //! memory holds none.

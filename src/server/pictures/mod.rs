@@ -1,6 +1,6 @@
 //! The cache of answers in memory: pictures of stored meshes, verdicts and differences. The key of an answer is a
-//! digest of all that decides it (for a picture it is also its `ETag`). Where the same answer is already being made
-//! for another request, a request waits for it.
+//! digest of all that decides it (mostly it is the `ETag`, too). Where the same answer is already being made for
+//! another request, a request waits for it.
 
 #[cfg(test)]
 mod tests;

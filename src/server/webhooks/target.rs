@@ -1,5 +1,5 @@
-//! Addresses to which webhooks may be sent: http or https, without user and password. Those of private networks are
-//! refused unless that is allowed.
+//! Addresses to which webhooks may be sent: http or https, without user and password. IP addresses of private
+//! networks and `localhost` are refused unless that is allowed; `client.rs` checks what other names lead to.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use std::sync::Arc;

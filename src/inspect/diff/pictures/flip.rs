@@ -1,7 +1,7 @@
 //! FLIP: a measure of the difference that a person sees when one picture is shown and then the other in its place. It
 //! goes from 0, no difference, to 1, the largest. The algorithm is that of Andersson, Nilsson, Akenine-Möller,
 //! Oskarsson, Åström and Fairchild, FLIP: A Difference Evaluator for Alternating Images (High Performance Graphics
-//! 2020), for pictures of low dynamic range; names of constants are those of the paper.
+//! 2020), for pictures of low dynamic range; constants such as `Q_C` and `P_T` have the names of the paper.
 //!
 //! A picture is taken to be looked at from 0.7 m, on a screen that is 0.7 m and 3840 pixels wide, as in the paper.
 

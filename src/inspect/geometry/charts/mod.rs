@@ -1,9 +1,9 @@
 //! UV charts: the pieces into which a texture unfolds a surface, how much each stretches the texture,
-//! and where they overlap.
+//! and how much faces overlap.
 //!
 //! A chart is a set of faces that are connected by edges along which both faces have the same texture
-//! coordinates. Coordinates are taken as they are: two faces that meet only because the texture
-//! repeats do not overlap.
+//! coordinates. Faces without area in the texture are in none. Coordinates are taken as they are: two
+//! faces that meet only because the texture repeats do not overlap.
 
 mod cover;
 mod overlaps;

@@ -1,4 +1,5 @@
-//! Faces that overlap others in the texture, and the areas that they cover.
+//! The number of faces that overlap others in the texture, and the areas that any face, and that two
+//! faces or more, cover.
 //!
 //! Two faces overlap if their interiors have a point in common: if no line along an edge of either
 //! face separates them. Exact predicates decide on which side of a line a point lies. Areas are

@@ -1,6 +1,6 @@
-//! Fans: 64 faces or more around one vertex, the apex. The boxes of all faces of a fan overlap at the apex, so that
-//! the tree of boxes of the mesh would find all of their pairs, whose number grows with the square of that of the
-//! faces.
+//! Fans: the faces around a vertex, the apex, which has 64 faces or more. A face is in one fan at most, that of its
+//! corner with the most faces. The boxes of all faces of a fan overlap at the apex, so that the tree of boxes of the
+//! mesh would find all of their pairs, whose number grows with the square of that of the faces.
 //!
 //! Each fan therefore has a tree of its own, of the directions from the apex to the points of each face. If two faces
 //! have another point in common than the apex, one ray from the apex meets both. So faces whose directions do not

@@ -1,5 +1,5 @@
-//! The test whether two faces intersect, and the test whether a vertex lies on an edge. Both are exact. Points that
-//! belong to the corners or the edge that two faces share are no intersection.
+//! The test whether two faces intersect, and the test whether a vertex lies on an edge, between its ends. Both are
+//! exact. Points that belong to the corners or the edge that two faces share are no intersection.
 
 use super::Point;
 use super::orient::orient;

@@ -1,9 +1,10 @@
-//! A tree of boxes (a bounding volume hierarchy) around the faces of a mesh. It finds the faces whose boxes overlap a
-//! given box, for the search for faces that intersect, and for faces that overlap in the texture.
+//! A tree of boxes (a bounding volume hierarchy), one around each face of a mesh: in space, in the texture, or around
+//! its directions from a vertex. It finds the faces whose boxes overlap a given box, in the searches for faces that
+//! intersect or overlap and for T-junctions.
 //!
 //! Faces are sorted along a space-filling curve (Morton order of the middles of their boxes), and cut into leaves of
-//! equal size. The tree above them is complete, so that nodes need no pointers: the children of node `i` are `2 i` and
-//! `2 i + 1`, and node 1 is the root.
+//! at most four. The tree above them is complete, so that nodes need no pointers: the children of node `i` are `2 i`
+//! and `2 i + 1`, and node 1 is the root.
 
 use std::ops::ControlFlow;
 

@@ -1,6 +1,5 @@
 //! The report of `meshsnap check` in Markdown, for a comment on a pull request: tables of the faults, of the changes
-//! since a commit, and of the pictures of files that fail. Rows that would make the comment too long are left out and
-//! counted.
+//! since a commit, and of the pictures of files that fail. Rows that would make the comment too long are left out.
 
 use std::fmt::Write as _;
 

@@ -2,8 +2,8 @@
 //! or JSON Lines. All are made of the same verdicts; a verdict is the result of the checks of one
 //! file.
 //!
-//! Equal verdicts make equal bytes: no report has the time of the run, its duration or the name of
-//! the machine.
+//! Equal verdicts and pictures make equal bytes: no report has the time of the run, its duration or
+//! the name of the machine.
 
 mod html;
 mod junit;

@@ -1,19 +1,20 @@
 //! The instruction sets of the processor (the baseline, AVX2, AVX-512), and macros that compile one
 //! source for several of them.
 //!
-//! The hot loops of every stage are written once and compiled for the baseline and for AVX2, a few
-//! of the innermost also for AVX-512. Most are plain loops over arrays of [`LANES`] values, which
-//! [`dispatch`] compiles. The innermost steps are written in the vectors of the crate
-//! `fearless_simd`, and [`with_simd`] and [`with_widest_simd`] compile them. Files called `avx2.rs`
-//! and `avx512.rs` hold second versions of steps for which that crate lacks instructions. Rust
-//! neither fuses nor reorders floating-point operations, so all give the same bytes; only the speed
-//! differs.
+//! Most hot loops are written once and compiled for the baseline and for AVX2, a few of the
+//! innermost also for AVX-512. Most of these are plain loops, often over arrays of [`LANES`]
+//! values, which [`dispatch`] compiles. Some innermost steps are written in the vectors of the
+//! crate `fearless_simd`, and [`with_simd`] and [`with_widest_simd`] compile them. Files called
+//! `avx2.rs` and `avx512.rs` hold second versions of other steps, each written for one instruction
+//! set. Rust neither fuses nor reorders floating-point operations, so all give the same bytes; only
+//! the speed differs.
 //!
-//! Code that is compiled in this way calls no closure that takes or makes vectors. The compiler may
-//! keep a closure as a function of its own, and that one would be compiled for the baseline alone.
+//! Code in the vectors of `fearless_simd` calls no closure that takes or makes vectors. The
+//! compiler may keep a closure as a function of its own, and that one would be compiled for the
+//! baseline alone.
 //!
-//! To add an instruction set: a variant of [`Level`] that holds its token, a constructor, and arms
-//! in the macros.
+//! To add an instruction set: a variant of [`Level`] that holds its token, a constructor that
+//! `detect` and `available` call, and arms in the macros.
 
 #[cfg(target_arch = "x86_64")]
 use fearless_simd::x86::{Avx2, Avx512};

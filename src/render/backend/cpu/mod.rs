@@ -3,8 +3,8 @@
 //!
 //! Stages in order: transform and visibility in `geometry`, then `occlusion`, `peeling`, shade in `surface`, `mixed`,
 //! `lines`, `resolve`. `context` holds the input that they share. Transform and occlusion look at the whole picture.
-//! `bands` runs the others: the picture is cut into bands of rows that fit a core's cache, threads take bands, and no
-//! band depends on another. The hot loops are compiled for several instruction sets (`isa`).
+//! `bands` runs the others: the picture is cut into bands of rows that mostly fit a core's cache, threads take bands,
+//! and no band depends on another. The hot loops are compiled for several instruction sets (`isa`).
 //!
 //! **Invariant:** threads and instruction sets do not change a byte.
 

@@ -1,5 +1,6 @@
 //! The queue of finished bands (ranges of pixel rows): it gives them to a [`RowSink`], such as an encoder, from the
-//! top down, while other bands are still being drawn.
+//! top down, while other bands are still being drawn. It may leave the last bands over, which are then taken from the
+//! finished picture.
 
 use std::sync::{Mutex, PoisonError, TryLockError};
 

@@ -1,5 +1,5 @@
-//! A stopwatch for the stages of a picture that the CPU draws, for reports. Nothing that is drawn
-//! depends on these times.
+//! A stopwatch for the stages of a picture that the CPU draws, for reports. One of its times has
+//! another use: that of encoding rows is left out of the costs by which a back-end may be chosen.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};

@@ -1,8 +1,9 @@
 //! The threads that draw on the CPU, shared by all renderers that are given them.
 //!
-//! A picture that is drawn alone uses all of them. `n` pictures at once use one n-th of them each; where that is less
-//! than 2 threads, a picture is drawn on its caller's thread. A picture gives up threads when another one begins,
-//! after the bands (ranges of rows) that they are drawing, and gets none back.
+//! A picture that begins alone uses all of them. While `n` pictures are drawn, each draws its bands (ranges of rows)
+//! on one n-th of the threads, but at least one; where that is less than 2 threads when a picture begins, it is
+//! drawn on its caller's thread. So when another picture begins, a picture gives up threads as soon as they have
+//! drawn their bands. A picture never has more threads than it began with.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};

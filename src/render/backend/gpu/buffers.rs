@@ -1,7 +1,8 @@
-//! The GPU buffers in which one job is drawn (a job draws one picture): its input, what the stages
-//! compute, and the picture's bytes. When a job has succeeded, its set of buffers is kept for a
-//! later job, because allocating buffers anew takes time. The finished picture takes along the
-//! buffer that holds its bytes. A set that would exceed the limit of memory for kept sets is freed.
+//! The GPU buffers in which a job (one picture) or several jobs together are drawn: their input, what
+//! the stages compute, and the bytes of the pictures. When that has succeeded, the set of buffers is
+//! kept for a later job, because allocating buffers anew takes time. The finished picture takes along
+//! the buffer that holds its bytes. A set is freed instead if it takes more than half of the memory
+//! for kept sets, or has no room beside the others.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

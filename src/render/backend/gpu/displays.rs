@@ -2,7 +2,7 @@
 //! print an error. The layer asks the Wayland display which GPU the display uses. In containers and
 //! services the variable `XDG_RUNTIME_DIR`, by which a display is found, is often not set, and the
 //! layer prints that to standard error. Pictures need no display: they are never drawn into a
-//! window.
+//! window. In a process that has several threads already, the switch does nothing.
 
 #![allow(unsafe_code)]
 

@@ -1,6 +1,6 @@
-//! The parts of an opened GPU that suffice to make and fill buffers: wgpu's device and queue, the limits, and the
-//! kinds of memory that the GPU has. They have a file of their own because `buffers` needs them and `device`, which
-//! has the rest, needs `buffers`.
+//! The parts of an opened GPU that suffice to make and fill buffers: wgpu's device and queue, the limits, the kinds
+//! of buffers that the GPU can use, and the spare buffers for pictures. They have a file of their own because
+//! `buffers` needs them and `device`, which has the rest, needs `buffers`.
 
 use std::sync::Arc;
 

@@ -9,10 +9,10 @@
 //! drawing of one picture), which `upload` fills, `staging` the buffers that pictures are read
 //! from, `residents` the data of meshes that stay in memory for the next job, `gang` the jobs that
 //! share dispatches, `pass_mask` the passes over triangles, `linear` pictures in linear light.
-//! `displays` keeps Mesa from looking for a window system.
+//! `displays` turns off a layer of Mesa that could only print an error.
 //!
 //! **Invariant:** a job uses the device on one thread only, because wgpu's error scopes belong to a
-//! thread.
+//! thread. Other threads may make its pipelines, in error scopes of their own.
 
 mod buffers;
 mod device;

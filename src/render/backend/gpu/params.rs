@@ -1,8 +1,8 @@
 //! The parameters of kernels in the layout in which shaders read them: `Frame`, the uniforms of a picture, and
 //! `Batch`, those of a dispatch, field for field as in shaders/common.wgsl.
 //!
-//! Also the tables that are put together from several lists of a plan before they are uploaded: textures, triangles'
-//! materials and edge masks, index arrays, lists of edges, and the points of each sample.
+//! Also the tables that are made for the upload of a plan: textures, triangles' materials and edge masks, materials
+//! of the outline mesh, index arrays, lists of edges, colours of lines, and the points of each sample.
 
 use std::sync::Arc;
 

@@ -1,7 +1,8 @@
-//! The passes over triangles in which stage visibility finds what can be seen: one over the triangles of the
-//! surface and one over those of the outline mesh. A pass draws into the visibility buffer (the nearest triangle
-//! of each sample) or into the layers of depth peeling (what is transparent). The pass mask of a surface triangle,
-//! one byte, says into which of these two the triangle is drawn; it may be both.
+//! The passes over triangles by which the stages visibility and peeling find what can be seen: one over the
+//! triangles of the surface and one over those of the outline mesh. A pass draws into the visibility buffer (the
+//! nearest triangle of each sample) or into the layers of depth peeling (what is transparent). The pass mask of a
+//! surface triangle, one byte, says into which of these two the triangle is drawn (it may be both), and whether only
+//! one of its sides is. Without masks, the surface is drawn into the visibility buffer alone.
 
 use std::ops::Range;
 

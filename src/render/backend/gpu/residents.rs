@@ -1,10 +1,11 @@
 //! Buffers that stay on the GPU from picture to picture, because many pictures show the same mesh: its positions,
-//! triangles, attributes, textures and edges. A list gets such a buffer when it is asked for a second time. To make
-//! room for a new buffer, those whose list is gone are freed first, then those that were used least recently.
+//! triangles, attributes, textures and edges. A list that fits gets such a buffer when it is asked for a second
+//! time. To make room for a new buffer, those whose list is gone are freed first, then those that were used least
+//! recently.
 //!
 //! **Invariant:** a buffer is found only for the very list that it was filled from. Lists are known by their owner,
-//! which never changes them, and their address. An owner's own address is not used again as long as a weak reference
-//! to it is kept here.
+//! which never changes them, their address and their size. An owner's own address is not used again as long as a weak
+//! reference to it is kept here.
 
 use std::any::Any;
 use std::collections::{HashMap, VecDeque};

@@ -1,6 +1,6 @@
 //! Buffers from which the CPU reads finished pictures in place, without a copy. A picture keeps its buffer until the
-//! last reader of its pixels is done. Other jobs draw into other buffers meanwhile, and a buffer that no picture lies
-//! in is kept for a later job.
+//! last reader of its pixels is done. Other jobs draw into other buffers meanwhile, and buffers that no picture lies
+//! in are kept for later jobs, as long as they do not take too much memory.
 
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};

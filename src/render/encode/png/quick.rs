@@ -1,6 +1,6 @@
-//! The quick PNG encoder. It takes the rows of a picture one after the other, so that upper rows are
+//! The quick PNG encoder. It takes the rows of a picture one after the other, so that upper rows can be
 //! encoded while lower ones are still being drawn. There is one filter for the whole picture, Paeth, and
-//! the Huffman codes are not fitted to it.
+//! the Huffman codes are not fitted to the picture.
 //!
 //! Paeth leaves of a rendering mostly runs of zeros, so trying more filters pays little. Where eight
 //! pixels and the one left of them equal those above, as in the background and in flat faces, zeros are

@@ -1,9 +1,9 @@
 //! The choice of the file that holds the mesh among the files of an upload, and of the format that
 //! it is read as.
 //!
-//! The mesh is the file that the client names. Without a name it is the first part of a package
-//! such as 3MF, or the only file, or the only one that is a mesh. The format is the client's, or
-//! else found from the bytes.
+//! The mesh is the file that the client names. Without a name it is the start part of a package such
+//! as 3MF, or the only file, or the only one that is a mesh. The format is the client's, or that of the
+//! package, or else found from the bytes.
 
 use crate::import::bundle::{Bundle, BundleFile, Origin, UNNAMED, is_zip, show, show_all};
 use crate::import::formats::FORMATS;

@@ -1,8 +1,8 @@
 //! An upload (`Bundle`): a mesh and the files that it refers to, such as textures and material
 //! libraries, each with a relative path.
 //!
-//! It is one file, several files, or a zip archive that is not yet unpacked. Paths that are
-//! absolute or have `..` in them are refused.
+//! It is one file, several files, or a zip archive that is not yet unpacked. Paths that are absolute,
+//! empty or very long, or have `..` or control characters in them, are refused.
 
 pub(crate) mod entry;
 pub(crate) mod folder;

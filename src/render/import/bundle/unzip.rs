@@ -1,7 +1,7 @@
 //! The unpacking of a zip archive into the files of an upload. What the archive declares is not
-//! trusted. The number of entries and the bytes of all files are limited, entries must not share
-//! bytes, and an entry is refused if it is far larger than its packed form or unpacks to another
-//! size than it declares.
+//! trusted. The number of entries and the bytes of all files are limited. An archive is refused if
+//! entries share bytes, if entries that are far larger than their packed form take many bytes, or if
+//! an entry unpacks to another size than it declares.
 
 use crate::guard::guarded;
 use crate::import::bundle::{BundleFile, show};

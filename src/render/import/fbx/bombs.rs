@@ -1,5 +1,5 @@
-//! The refusal of decompression bombs in binary FBX files. Their arrays are deflated one by one,
-//! and the parser `ufbx` trusts the declared sizes as far as memory allows. So the arrays whose
+//! The refusal of decompression bombs in binary FBX files. Their arrays may be deflated, each by
+//! itself, and the parser `ufbx` trusts the declared sizes as far as memory allows. So the arrays whose
 //! declared size is not plausible (for example more than 200 times the packed bytes) are added up
 //! first, and a file with too many bytes of them is refused.
 //!

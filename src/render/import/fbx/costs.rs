@@ -1,11 +1,11 @@
-//! The refusal of FBX files that would keep the parser `ufbx` busy for minutes without a deadline
+//! The refusal of FBX files that could keep the parser `ufbx` busy for long without a deadline
 //! check. Two of its loops take a time that grows with a product of the numbers of some nodes.
 //!
 //! One is about textures that are made of other textures: the square of their number, times the
 //! number of all textures. The other searches the sets of texture coordinates and tangents for each
-//! entry of a layer (`LayerElement`). The names of these nodes are counted in the bytes before the
-//! file is parsed, as binary files and text files write them. Bytes that only look like such a name
-//! count, too.
+//! entry of a layer (`LayerElement`). The names of these nodes, or of their properties, are counted in
+//! the bytes before the file is parsed, as binary files and text files write them. Bytes that only look
+//! like such a name count, too.
 
 use crate::import::context::Context;
 use crate::import::{MeshError, MeshFault};

@@ -2,9 +2,9 @@
 //! back, and the checks of the answer. The file may be hostile and its parser is written in C, so
 //! the process that parsed it is not trusted: its answer is checked like a stranger's file.
 //!
-//! serde writes order and answer as `postcard`. This form is private to two processes of one
-//! program. For it alone, and with the feature `isolate` alone, [`RawMesh`] and the types in it
-//! derive `Serialize`.
+//! The head of the order and the answer are written by serde as `postcard`. This form is private to
+//! two processes of one program. For it alone, and with the feature `isolate` alone, [`RawMesh`]
+//! and the types in it derive `Serialize`.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,7 @@
 //! The visibility of the nodes of an FBX scene. A node that the file hides is not drawn, and
 //! neither are its children, except those that do not inherit visibility. Of an object in several
-//! levels of detail the first is drawn, unless the file selects another.
+//! levels of detail the first is drawn. A level that the file marks as shown or hidden follows that
+//! mark instead.
 
 use crate::import::MeshError;
 use crate::import::context::Context;
@@ -63,8 +64,8 @@ fn inherits(node: &Node) -> bool {
     node.element.props.find_prop("Visibility Inheritance").is_none_or(|prop| prop.value_int != 0)
 }
 
-/// True if a child of a node is the drawn level of detail: the first, which is the finest, unless
-/// the group selects another.
+/// False if a child of a node is a level of detail that is not drawn. The first, which is the finest,
+/// is drawn, unless the group says of a level whether it is shown.
 fn is_drawn(node: &Node, level: usize) -> bool {
     let Some(ElementData::LodGroup(group)) = node.attrib.as_ref().map(|element| element.as_data()) else { return true };
     match group.lod_levels.get(level).map(|level| level.display) {

@@ -1,6 +1,6 @@
 //! The repair of vertex attributes (normals, texture coordinates, colours): values become finite,
-//! normals get unit length, and arrays that cannot be used are dropped, such as one without a value
-//! for each vertex.
+//! normals of triangles get unit length, and arrays that cannot be used are dropped, such as one
+//! without a value for each vertex.
 
 use crate::import::raw::RawMesh;
 use crate::mesh::Mesh;
@@ -10,7 +10,7 @@ use crate::warning::Warning;
 /// The repaired attributes: each empty, or one value per raw vertex.
 #[derive(Debug, Default)]
 pub struct Attributes {
-    /// Unit normals.
+    /// Unit normals; zero for a vertex that has none in the file and no triangle.
     pub normals: Vec<[f32; 3]>,
     /// Texture coordinates.
     pub uvs: Vec<[f32; 2]>,

@@ -1,5 +1,6 @@
-//! The choice of the triangles of an imported mesh that can be drawn (its faces): those with finite
-//! corners and an area that is not zero. Each gets a unit normal here. The others are counted.
+//! The choice of the faces of an imported mesh: its triangles with finite corners (coordinates
+//! below about 2^1022) and an area that is not zero. Each gets a unit normal here. The others are
+//! counted. Welding may drop more.
 
 use super::geometry::{Geometry, Key as _};
 use super::local::{CORNERS_MAX, Local};

@@ -1,6 +1,6 @@
 //! The trait `Geometry`, through which normalisation reads the triangles of an imported mesh. It is
 //! the same for the two ways in which importers deliver them: as indices of vertices, or as
-//! positions that are left where they lie in the file (STL).
+//! positions that are left where they lie in the file (binary STL).
 
 use crate::import::raw::Soup;
 

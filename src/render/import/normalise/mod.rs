@@ -3,7 +3,7 @@
 //! infinity or no area are dropped, and equal positions are welded (made one).
 //!
 //! Positions are scaled to that box by powers of two alone. This rounds nothing, so a file scaled
-//! by a power of two gives the same mesh.
+//! by a power of two gives the same mesh in that box.
 
 pub(crate) mod attributes;
 mod faces;

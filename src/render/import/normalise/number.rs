@@ -1,6 +1,6 @@
-//! The final order of a mesh's positions. `weld` makes equal positions one, in an order that
-//! depends on a random hash. So the distinct ones are numbered here in the order of their first use
-//! by triangles, and then by lines and points. Those that nothing uses are left out.
+//! The order of a mesh's positions. `weld` makes equal positions one, in an order that depends on a
+//! random hash. So the distinct ones are numbered here in the order of their first use by
+//! triangles, and then by lines and points. Those that nothing uses are left out.
 
 use super::faces::{Faces, Piece};
 use super::geometry::{Geometry, Key};

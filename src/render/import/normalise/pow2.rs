@@ -1,4 +1,5 @@
-//! Exact scaling by powers of two, for the whole range of f64.
+//! Scaling by powers of two for the whole range of f64, exact unless the result over- or
+//! underflows.
 
 /// Larger coordinates count as infinite. Sums and differences of two smaller ones cannot overflow.
 pub const TOO_LARGE: f64 = 4.49423283715579e307; // about 2^1022

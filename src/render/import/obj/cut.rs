@@ -1,8 +1,8 @@
 //! The cutting of an OBJ text into parts of about 256 KiB, which several threads can parse at the
 //! same time. A cut lies at the end of a line, and never at one that a backslash continues.
 //!
-//! The content of a part is also estimated here, from its white space and the beginnings of its
-//! lines, so that memory can be reserved before it is parsed.
+//! The content of a part is also estimated here, from its white space, its slashes and the
+//! beginnings of its lines, so that memory can be reserved before it is parsed.
 
 /// Bytes of a part, about: a part and what is read from it fit the second cache of a core.
 pub const PART_BYTES: usize = 256 << 10;

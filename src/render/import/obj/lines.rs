@@ -1,6 +1,6 @@
 //! The lines of an OBJ or MTL file. A line that ends with a backslash is joined with the next,
 //! unless it is a comment. Line ends may be line feeds, with or without a carriage return, or
-//! carriage returns alone.
+//! carriage returns alone in a file without line feeds.
 
 use std::borrow::Cow;
 

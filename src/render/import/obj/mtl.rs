@@ -1,6 +1,6 @@
-//! MTL, the material library of OBJ, read line by line. Only materials that the mesh uses are kept,
-//! so that those that are not used take no memory. Lines with broken values, and textures that are
-//! not drawn, are counted for warnings. Other lines of unknown meaning are skipped.
+//! MTL, the material library of OBJ, read line by line. Only materials that the OBJ file names are
+//! kept, so that others take no memory. In the kept ones, lines with broken values and most
+//! textures that are not drawn are counted for warnings. Other lines are skipped.
 
 use super::lines::{Lines, uncommented};
 use super::map::{Map, number, split_word};

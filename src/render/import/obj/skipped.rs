@@ -1,4 +1,5 @@
-//! Counts of the content of an OBJ file that is not drawn, and the warnings about it.
+//! Counts of lines of an OBJ file for warnings: faces with too few corners and free-form geometry,
+//! which are not drawn, and vertices that differ from the first in having a colour or not.
 
 use crate::import::report::counted_warnings;
 use crate::warning::Warning;

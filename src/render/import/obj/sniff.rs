@@ -1,5 +1,5 @@
-//! The recognition of OBJ, which has neither a signature nor a keyword. A file is taken for OBJ if
-//! a line in its first MiB is a vertex with three numbers, or a face with an index.
+//! The recognition of OBJ, which has no signature. A file that no stronger test recognises is taken
+//! for OBJ if a line in its first MiB is a vertex with three numbers, or a face with an index.
 
 use crate::import::text;
 

@@ -1,5 +1,5 @@
 //! The colours of OFF files, converted to linear light. Components go up to 255 or up to 1: the
-//! largest one in the file decides, for whole numbers and for fractions separately.
+//! largest one in the file decides, separately for colours in whole numbers and for all others.
 
 use super::Number;
 use crate::srgb::srgb_to_linear;
@@ -7,8 +7,8 @@ use crate::srgb::srgb_to_linear;
 /// The colour of elements without one, where others have one.
 pub const WHITE: [f32; 4] = [1.0; 4];
 
-/// Colours of vertices or of faces, as read. A value above 1 anywhere in the file means a scale of
-/// 0 to 255.
+/// Colours of vertices or of faces, as read. A value above 1 means a scale of 0 to 255, either for
+/// all colours in whole numbers or for all others.
 #[derive(Debug, Default)]
 pub struct Colors {
     /// Components as read. Alpha is negative where the file has none.

@@ -1,5 +1,6 @@
 //! The faces of an OFF file and their colours. A mesh has its colours at vertices, so a vertex of
-//! faces of different colours is duplicated. A file without faces is drawn as points.
+//! faces of different colours is duplicated. If the file has colours at vertices, those of faces
+//! are ignored. A file without faces is drawn as points.
 
 use super::colors::{COLOR_BYTES, Colors, WHITE};
 use super::{Counts, Source};
@@ -115,7 +116,7 @@ impl Faces {
 }
 
 impl Split {
-    /// Fills up colours for earlier faces without one.
+    /// Marks the vertices of earlier faces, which have no colour.
     fn new(vertices: u32, raw: &RawMesh, cx: &mut Context<'_>) -> Result<Self, MeshError> {
         cx.budget.spend("the colours of OFF faces", u64::from(vertices), 4 + 4 + 16)?;
         let count = vertices as usize;

@@ -1,5 +1,5 @@
 //! The words of an OFF text, one by one, on one line or across lines. Comments, from `#` to the end
-//! of the line, are passed over.
+//! of the line, are passed over. The `#` of a NaN such as `1.#IND` begins none.
 
 use crate::import::text;
 

@@ -1,6 +1,6 @@
 //! The assembly of a PLY mesh from the vertices and faces of the file. Polygons are split into
-//! triangles. A mesh has its attributes at vertices, so corners with texture coordinates or colours
-//! of their own get vertices of their own.
+//! triangles. A mesh has its attributes at vertices, so a vertex is copied where the corners of faces
+//! at it differ in texture coordinates or colour.
 
 use super::conversion::WHITE;
 use super::faces::{Faces, NO_TEXTURE};

@@ -1,5 +1,5 @@
-//! The header of a PLY file: the encoding, and the elements (kinds of records, such as `vertex`)
-//! with their counts and properties.
+//! The header of a PLY file: the encoding, the names of textures, and the elements (kinds of records,
+//! such as `vertex`) with their counts and properties.
 
 use crate::import::MeshError;
 use crate::import::bundle::show;

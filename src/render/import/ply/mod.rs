@@ -1,6 +1,6 @@
 //! PLY, the polygon file format (Greg Turk, "The PLY Polygon File Format", 1994), in all three
-//! encodings, with the additions of MeshLab and Blender: texture coordinates per corner
-//! (`texcoord`), textures (`comment TextureFile`, `texnumber`), triangle strips.
+//! encodings, with common additions: texture coordinates per corner (`texcoord`), textures
+//! (`comment TextureFile`, `texnumber`), triangle strips (`tristrips`).
 //!
 //! The [`header`] may declare any properties of any types in any order, so it is compiled to a
 //! [`layout`], the steps through a record. [`source`] walks the records of a [`text`] or [`binary`]

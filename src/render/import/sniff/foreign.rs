@@ -1,6 +1,6 @@
-//! Kinds of files that are recognised but not read: other mesh formats, archives, pictures. Each
-//! has the words in which callers refuse it, with advice where there is some (convert it, unpack
-//! it).
+//! Kinds of files that are recognised but not read, such as other mesh formats, archives and
+//! pictures. Each has the words in which callers refuse it, with advice where there is some (convert
+//! it, unpack it).
 //!
 //! Without this, a file of another kind that holds lines of a mesh would be read as a mesh, such as
 //! a tar archive of OBJ files.

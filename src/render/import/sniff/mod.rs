@@ -1,5 +1,5 @@
 //! The recognition of a format by the bytes, because file names and content types are often wrong.
-//! An extension counts only for a file among others whose bytes prove little.
+//! An extension counts only if the file lies among others and its bytes prove little.
 //!
 //! The tests are those of the formats, in [`FORMATS`]. They run in the order of their [`Evidence`]
 //! (how much a match proves), the strongest first. Between them, files that a weaker test would

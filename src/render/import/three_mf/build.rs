@@ -1,6 +1,6 @@
 //! The assembly of a 3MF file's mesh: each build item (an object that is to be printed) with its
 //! transform, and so on down through its components (references to other objects, each with a
-//! transform).
+//! transform). Without build items, the objects that are no components take their place.
 //!
 //! Objects and triangles are counted before memory is reserved for them. Otherwise a small file in
 //! which each object refers twice to the next one could ask for 2^n copies. Such a file is refused

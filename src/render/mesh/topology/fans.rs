@@ -1,7 +1,7 @@
 //! The fans of faces around vertices.
 //!
 //! A fan is a set of faces at a vertex that are connected through edges at this vertex. A vertex of
-//! a manifold surface has one fan; a vertex where two surfaces touch has two.
+//! a manifold surface has one fan; a vertex where two surfaces touch without a common edge has two.
 
 use crate::mesh::Mesh;
 use crate::mesh::edges::{Edge, EdgeList};

@@ -1,5 +1,5 @@
-//! The topology of a mesh: components, open and non-manifold edges, boundary loops, Euler
-//! characteristic, genus.
+//! The topology of a mesh: components, open and non-manifold edges, boundary loops, duplicate faces,
+//! Euler characteristic, orientation, genus.
 //!
 //! Union-find and sorting find everything in O(n log n), whatever the mesh. [`fans`] groups the
 //! faces around each vertex, [`surfaces`] the faces of each surface.

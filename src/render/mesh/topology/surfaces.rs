@@ -1,6 +1,6 @@
-//! The surfaces of a mesh, with their orientability and genus. A surface is a set of faces that are
-//! connected through manifold edges, which are edges with exactly two faces. At all other edges, faces
-//! count as cut apart.
+//! The surfaces of a mesh: their orientability, and the genus of those that are closed and orientable. A
+//! surface is a set of faces that are connected through manifold edges, which are edges with exactly two
+//! faces. At all other edges, faces count as cut apart.
 
 use super::fans::Fans;
 use crate::mesh::Mesh;

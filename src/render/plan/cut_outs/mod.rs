@@ -1,7 +1,7 @@
 //! Cut-outs: faces with a texture whose alpha mask makes parts of them invisible, such as a card
 //! with a leaf on it. This module finds which of these faces, and which of their sides, show no
-//! texel at all. Such a side gets no outline (`silhouettes`), and the camera is not fitted to such
-//! a face (`framing`).
+//! texel at all. In a picture that shows the mask, such a side counts as absent for outlines
+//! (`silhouettes`), and the camera is not fitted to such a face (`framing`).
 //!
 //! The result depends on the mesh alone and is found once for it, from the texels of its images. It
 //! is conservative: a face or a side counts as visible unless certainly nothing of it shows.

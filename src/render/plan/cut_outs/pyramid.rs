@@ -1,5 +1,5 @@
 //! A pyramid of bits over a texture with an alpha mask, and the search in it for a visible texel that a
-//! triangle touches. In the lowest level a bit says whether a texel is visible. In each higher level it
+//! triangle may touch. In the lowest level a bit says whether a texel is visible. In each higher level it
 //! says whether any of the four below it is set, so the search leaves out squares without a visible
 //! texel.
 

@@ -1,5 +1,5 @@
-//! The contact shadow on the plane below a mesh: how much of the sky the mesh hides from each place
-//! there, roughly.
+//! The contact shadow on the plane below a mesh: how much of the sky the mesh's filled faces hide from
+//! each place there, roughly.
 //!
 //! A grid lies on the plane. For each of its cells, a height map has the lowest height of the mesh above it. The
 //! mesh above a cell darkens the plane around it: the lower it is, the darker, and the narrower the shadow. This is

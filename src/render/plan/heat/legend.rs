@@ -1,5 +1,5 @@
-//! The legend of a diagnostic picture as data: the name of what its colours measure, the lowest and the
-//! highest number, and the colours between them. `caption` draws it.
+//! The legend of a diagnostic picture as data: the name of what its colours measure, the numbers of the
+//! first and the last colour, and the colours. `caption` draws it.
 
 use super::color_map::ColorMap;
 use crate::image::srgb8_thresholds;

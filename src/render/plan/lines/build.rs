@@ -1,6 +1,6 @@
 //! The lists of edges that are drawn as lines. For each line style (a width, a colour, and a treatment of
-//! hidden parts) all edges of the mesh that have it are collected, each once, and become passes for the
-//! back-ends. Wires, topology lines and contours are made here.
+//! hidden parts) the edges of the mesh that have it are collected, each once and without short chains, and
+//! become passes for the back-ends. Wires, topology lines and contours are made here.
 
 use std::sync::Arc;
 

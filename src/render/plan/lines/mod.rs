@@ -1,7 +1,7 @@
-//! Lines of exact width in pixels along the mesh's edges: wires, topology lines and contours. A
-//! `LinePass` is a list of edges with a width and a colour, as back-ends draw it. Distances that follow
-//! from its width, such as how far a line reaches, are computed here, so that both back-ends use the
-//! same.
+//! Lines of exact width in pixels: wires, topology lines and contours along the mesh's edges, and line and
+//! point primitives without a surface (`primitives`). A `LinePass` is a list of edges with a width and a
+//! colour, as back-ends draw it. Distances that follow from its width, such as how far a line reaches, are
+//! computed here, so that both back-ends use the same.
 
 pub(crate) mod auto_width;
 pub(crate) mod build;

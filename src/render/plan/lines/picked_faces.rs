@@ -1,6 +1,6 @@
-//! The faces from which `auto_width` computes the width of lines: all faces of a mesh with up to 4096, and a sample
-//! of about 6000 faces of a larger mesh, which saves time. Large faces are picked more often, and each picked face
-//! has a weight that says how many it stands for.
+//! The faces from which `auto_width` computes the width of lines: all faces of a mesh with up to 4096, and of a
+//! larger mesh a sample of up to about 6000 faces, which saves time. Large faces are picked more often, and each
+//! picked face has a weight that says how many it stands for.
 //!
 //! A hash of a face's corners decides whether it is picked, so the order of faces in the file hardly matters.
 

@@ -1,6 +1,6 @@
-//! The removal of short lines along feature edges, which are edges where the surface bends sharply or
-//! ends. Feature edges that are joined at vertices form a chain. Chains that are shorter on screen than
-//! `wire.min_length` are left out.
+//! The removal of short lines along feature edges, which are edges where the surface bends sharply, ends
+//! or branches. Feature edges that are joined at vertices form a chain. Chains that are shorter on screen
+//! than `wire.min_length` are left out.
 //!
 //! The surface of a scan has a multitude of small folds, a few pixels long, that bend as sharply as true features.
 //! Lines along them would look like hatching without a meaning.

@@ -1,7 +1,8 @@
 //! Chains of silhouette edges, which are edges where a surface ends on screen. A chain consists of
-//! the visible parts of such edges that are joined at vertices. Chains that are too short are not
-//! drawn, unless they border the background or leave the picture. Nor is a long run of parts drawn
-//! if surfaces closely behind hide most of its outline: a dotted line would be left.
+//! the visible parts of such edges that are joined at vertices or by short hidden edges. Chains that
+//! are too short are not drawn, unless they border the background or leave the picture. Nor is a long
+//! run of parts drawn if surfaces closely behind hide most of its outline: a dotted line would be
+//! left.
 //!
 //! Scans and coarse meshes have a multitude of tiny folds. Each has a silhouette of a few pixels,
 //! and an outline beside it would look like a speck of dirt.

@@ -2,9 +2,9 @@
 //!
 //! Users know inverted hulls, copies of a mesh pushed out along its normals. This outline mesh
 //! differs: a plan knows its camera, so it makes the border itself, as wide as it should be and
-//! with round corners. Beside each [silhouette edge](silhouette_edges), where a surface ends on
-//! screen, lies an [offset quad](build), and around the vertices between two of them a [round
-//! join](round_join).
+//! with round corners. Beside each visible part of a [silhouette edge](silhouette_edges), where a
+//! surface ends on screen, lies an [offset quad](build), and around the vertices between two of them
+//! a [round join](round_join).
 //!
 //! Contours, the outlines that are drawn as lines, come from the same silhouette edges ([`parts`]).
 

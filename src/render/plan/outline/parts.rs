@@ -1,7 +1,8 @@
 //! The parts of silhouette edges (where a surface ends on screen) that an outline draws: those that
-//! no face hides, without chains that are too short. Both kinds of outlines are made from them:
-//! hulls, which are meshes beside the shape, and contours, which are lines. Only where the least
-//! length of all contours is 0 do back-ends find the contours instead.
+//! no face hides, without chains that are too short or would be dotted lines. Both kinds of outlines
+//! are made from them: hulls, which are meshes beside the shape, and contours, which are lines along
+//! the edges that have such parts. Only where the least length of all contours is 0 do back-ends find
+//! the contours instead.
 
 use crate::mesh::edges::EdgeList;
 use crate::plan::PlanError;

@@ -1,5 +1,5 @@
-//! The depth cue of points: a point is darker where points beside it on screen are nearer, so that a
-//! dense cloud reads as a surface and its silhouettes stand out.
+//! The depth cue of lit points: a point is darker where points beside it on screen are nearer, so that
+//! a dense cloud reads as a surface and its silhouettes stand out.
 //!
 //! This is eye-dome lighting (Boucheny, "Visualisation scientifique de grands volumes de donnees", 2009)
 //! computed once per point instead of once per pixel. Both back-ends draw its result as colours.

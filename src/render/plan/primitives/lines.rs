@@ -1,7 +1,7 @@
-//! Lines and points of the file whose material has no filled surface. They are drawn as lines of
-//! exact width in pixels, in the colour and width of their material's wire, or else of its outline.
-//! A wire by another method than `exact` has no width in pixels, and is given a fixed one. A point
-//! is a line of no length, which shows as a dot.
+//! Lines and points of the file whose material has no filled surface, but a wire or an outline. They
+//! are drawn as lines of exact width in pixels, in the colour and width of the wire, or else of the
+//! outline. A wire by another method than `exact` has no width in pixels, and is given a fixed one. A
+//! point is a line of no length, which shows as a dot, wider by the factor `points.size_px` / 1.5.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! Lines and points as triangles that face the camera: a quad per line, a hexagon per point, of a
-//! width in pixels. They have no polygon edges, no outlines and no topology.
+//! Lines and points whose material has a filled surface, as triangles that face the camera: a quad per
+//! line, a hexagon per point, of a width in pixels. They have no polygon edges, outlines or topology.
 
 use glam::{DVec2, DVec3};
 

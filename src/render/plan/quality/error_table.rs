@@ -1,8 +1,7 @@
-//! The table of measured errors and times, `error_table.json`, as `quality` reads it. It has a row
-//! for each drawing technique (a way to draw surfaces, wires or outlines), back-end and
-//! number of samples. From these rows follow the error and the time to expect of a picture of any
-//! size. The benchmark writes the table (`cargo bench --bench accuracy -- --write`), whose key
-//! `about` explains its numbers.
+//! The table of measured errors and times, `error_table.json`, as `quality` reads it. It has rows by
+//! drawing technique (a way to draw surfaces, wires or outlines), back-end and number of samples. From
+//! these rows follow the error and the time to expect of a picture of any size. The benchmark writes
+//! the table (`cargo bench --bench accuracy -- --write`), whose key `about` explains its numbers.
 
 use std::sync::LazyLock;
 

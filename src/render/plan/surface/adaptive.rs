@@ -1,6 +1,7 @@
-//! The decision for adaptive samples: a few samples in every pixel, and many more points in pixels near
-//! which faces of different colours meet. Some pictures cannot have them, for example those in which all
-//! faces are transparent. They get 16 samples in every pixel instead, and a warning.
+//! The decision for adaptive samples: 4 samples in every pixel (16 if something is transparent), and
+//! many more points in some pixels near which faces of different colours meet. Some pictures cannot
+//! have them, for example those in which all faces are transparent. They get 16 samples in every pixel
+//! instead, and a warning.
 
 use crate::plan::PeelingPass;
 use crate::plan::context::PlanContext;

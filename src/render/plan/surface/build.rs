@@ -1,7 +1,6 @@
-//! The making of the surface, the part of a plan that colours filled faces, or only lets faces hide
-//! lines: its materials as shaders read them, its textures and lamps, and the arrays that these
-//! materials read, such as normals and texture coordinates. Arrays that no material reads are left
-//! out.
+//! The making of the surface, the part of a plan that colours filled faces and barycentric wires, or
+//! only lets faces hide lines: its materials as shaders read them, its textures and lamps, and the
+//! arrays that these materials read, such as normals and texture coordinates.
 
 use std::borrow::Cow;
 use std::sync::Arc;

@@ -1,11 +1,11 @@
 //! The finest mip level of each texture that a pixel of the picture can sample, or a finer one where that
 //! is not certain. Levels finer than this need not be kept.
 //!
-//! A pixel's footprint in a texture is an ellipse, and A the product of its axes: the texels that the pixel covers. The
-//! sampler takes the level of the longer axis where the axes' ratio r is below 1.5, which is at least
-//! log2(sqrt(A)). Elsewhere it looks at up to [`TAPS_MAX`] places along the longer axis, in the level of the shorter
-//! one, log2(sqrt(A / r)), or of an eighth of the longer one, log2(sqrt(A r) / 8), whichever is coarser. So no pixel
-//! reaches below log2(sqrt(A / min(r, 8))).
+//! A pixel's footprint in a texture is an ellipse, and A the product of its axes: the texels that the pixel covers.
+//! Where the sampler looks at one place, as where the axes' ratio r is below 1.5, it takes the level of the longer
+//! step to a neighbouring pixel, which is at least log2(sqrt(A)). Elsewhere it looks at up to [`TAPS_MAX`] places
+//! along the longer axis, in no finer level than that of the shorter one, log2(sqrt(A / r)), and that of an eighth of
+//! the longer one, log2(sqrt(A r) / 8). So no pixel reaches below log2(sqrt(A / min(r, 8))).
 //!
 //! Over a triangle with screen corners s_i, texel corners t_i and distances W_i, perspective interpolation gives
 //!
@@ -15,15 +15,14 @@
 //! ```
 //!
 //! (u and v are ratios of functions that are linear on screen, with the denominator q = 1 / W. J is the matrix of the
-//! derivatives, J_0 that at the first corner, f a factor, d = p - s_0, and g = grad q / q(p).) A pixel is shaded at the
-//! mean of its samples, which lie inside the triangle, where W is at least the smallest W_i. And r is at most
+//! derivatives, J_0 that at the first corner, f a factor, d = p - s_0, and g = grad q / q(p).) A pixel is shaded at
+//! the mean of its samples, which lie inside the triangle, where W is at least the smallest W_i. And r is at most
 //! r_0 (1 + |d| |g|)^2 q_max / q_min, since the determinant of I - d g^T is q_0 / q(p). So the least of A / min(r, 8)
 //! over all triangles bounds the level from below.
 //!
-//! Rounding: corners are snapped to whole units of 1/256 px, so area(s) may be larger than the true
-//! one, by at most e perimeter + 3 e^2 for corners that move by e; and f32 coordinates make area(t)
-//! uncertain in the same way. Both are taken at their worst. A corner that is snapped nowhere,
-//! behind the eye or far outside, keeps every level.
+//! Rounding: corners are snapped to whole units of 1/256 px, so area(s) may be larger than the true one, by at most e
+//! perimeter + 3 e^2 for corners that move by e; and f32 coordinates make area(t) uncertain in the same way. Both are
+//! taken at their worst. A corner that is snapped nowhere, behind the near plane or far outside, keeps every level.
 
 use crate::limits::{Deadline, Stopped};
 use crate::mesh::Mesh;

@@ -1,5 +1,6 @@
-//! A mask for each triangle that says which of its three edges get a wire. It is for wires that are drawn
-//! by barycentric coordinates while the surface is shaded, and for the debug view of distances to edges.
+//! A mask for each triangle that says which of its three edges its material's wire follows (all, if
+//! there is no wire). It is for wires that are drawn by barycentric coordinates while the surface is
+//! shaded, and for the debug view of distances to edges.
 
 use crate::mesh::Mesh;
 use crate::mesh::edges::{Edge, EdgeList};

@@ -1,5 +1,6 @@
-//! The lamps of each lighting preset of a request. They are placed around the viewer, so that every
-//! view of a model is lit equally well. Only the key light may have a direction from the request.
+//! The lamps of each lighting preset of a request. They turn with the camera, so that every view of a
+//! model is lit equally well. Only the key light may have a direction from the request instead, in the
+//! file's coordinates.
 
 use glam::DVec3;
 

@@ -1,6 +1,7 @@
-//! The surface of a plan: all that a back-end needs to turn a visible point of a filled face into a
-//! colour. These are materials, textures, lamps, and values at the corners of triangles, such as normals.
-//! The layout of materials and the bits of their flags, which shaders read, are defined here.
+//! The surface of a plan: what a back-end reads to colour a visible point of a filled face or of a
+//! barycentric wire. These are materials, textures, lamps, and values of triangles and of their
+//! corners, such as normals. The layout of materials and the bits of their flags, which shaders read,
+//! are defined here.
 
 pub(crate) mod adaptive;
 pub(crate) mod build;
@@ -19,7 +20,7 @@ use super::Faces;
 use super::shared_slice::SharedSlice;
 use crate::texture::Textures;
 
-/// The filled surface. Arrays that no material reads are empty.
+/// The filled surface. Arrays that no material reads may be empty.
 #[derive(Debug)]
 pub struct SurfacePass<'a> {
     /// The faces that are drawn.

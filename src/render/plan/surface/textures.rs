@@ -1,6 +1,7 @@
-//! The loader of the images that materials sample. An image is decoded only if it is sampled, once
-//! per way of reading its texels (as colours, as numbers, or with an alpha cutoff). Mip levels that
-//! are finer than the picture can show are not made.
+//! The loader of the images that materials sample. An image is decoded only if it is sampled and not
+//! kept from an earlier picture, once per way of reading its texels (as colours, as numbers, or with an
+//! alpha cutoff). Mip levels that are finer than the picture can show, or than there is room for, are
+//! not made.
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
-//! The debug view `uv-layout`: the faces as they lie in the texture, instead of in space. It is a
-//! flat mesh of its own, which is drawn like any other. Faces that are turned over, and faces that
-//! overlap others, have colours of their own.
+//! The debug view `uv-layout`: the faces as they lie in the texture, instead of in space. It is a flat
+//! mesh of its own, which is drawn like any other. Faces that are turned over, and faces that are found
+//! to overlap others, have colours of their own.
 
 mod overlaps;
 

@@ -1,6 +1,7 @@
 //! The faces that overlap others in the texture. They are found at the points of a grid: where a point
 //! lies in two faces, these overlap. A point on an edge belongs to one of the edge's two faces, so that
-//! neighbours do not count as overlapping. Overlaps between the points are not found.
+//! neighbours do not count as overlapping. Overlaps between the points are not found. The search ends
+//! after a large number of points.
 
 use crate::limits::{Deadline, Stopped};
 

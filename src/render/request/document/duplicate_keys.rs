@@ -1,7 +1,7 @@
-//! The check that refuses a document or a query with duplicate keys. A key may be given twice under
-//! the same name, or under a short and a long one (`samples` and `image.samples`). The sender meant
-//! both values, and one would be lost. On a command line, later flags override earlier ones
-//! instead.
+//! The check that refuses a document or a query with duplicate keys: two under the same name, or one
+//! under its short name and one under its long one (`samples` and `image.samples`). The sender meant
+//! both values, and one would be lost. In a document, `null` under the other name does not count. On a
+//! command line, later flags override earlier ones instead.
 
 use std::collections::BTreeMap;
 

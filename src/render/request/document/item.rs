@@ -1,4 +1,4 @@
-//! One key of a request and its value, from the document or from a query.
+//! One key of a request and its value, from the document, a query or `--set`.
 
 use crate::request::table::value::Given;
 use crate::request::table::{self, MATERIALS};

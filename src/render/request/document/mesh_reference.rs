@@ -1,5 +1,6 @@
-//! Request documents that are sent in place of a mesh file: under the key `mesh` they name a mesh that
-//! the server has stored. A glTF file is JSON as well, so the two must be told apart here.
+//! The recognition of request documents that are sent in place of a mesh file: under the key `mesh`
+//! they name a mesh that the server has stored. A glTF file is JSON as well, so the two are told apart
+//! here.
 
 use std::fmt;
 

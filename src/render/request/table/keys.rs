@@ -1,6 +1,6 @@
-//! The list of all keys of a request that hold values, except `style`. The entry of a key has its name,
-//! the place in the draft that it sets, the values that are allowed, its short name and its default if it
-//! has them, and a line on what it does.
+//! The list of all keys of a request that hold values, except `style`, `mesh` and `$schema`. The entry
+//! of a key has its name, the place in the draft that it sets, the values that are allowed (if they are
+//! not those of its type), its short name and its default (if it has them), and a line on what it does.
 
 use serde_json::Value::Null;
 use serde_json::json;

@@ -1,6 +1,6 @@
-//! The table of keys: everything that a request document may contain. The reader, its error
-//! messages, the JSON Schema and the list of capabilities follow from it. A new key needs one entry
-//! of [`keys`], and the field of the spec that it sets.
+//! The table of keys: all that a request document may contain, except `style` and `mesh`. The reader,
+//! its error messages, the JSON Schema and the list of capabilities follow from it. A new key needs one
+//! entry of [`keys`], and the field of the spec that it sets.
 
 pub(crate) mod dependent;
 pub(crate) mod field;
@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 
 use self::field::{Field, Section};
 
-/// Every key that holds a value, except `style`: it is read before all others, which override it.
+/// Every key that holds a value, except `$schema`, `mesh`, and `style`, which is read before all others.
 pub static FIELDS: LazyLock<Vec<Field>> = LazyLock::new(keys::all);
 
 /// The objects that hold keys: layers, then groups.

@@ -1,5 +1,5 @@
 //! Values of a request, in three types: `Given` is a value as it was sent, as JSON or as text; `Kind`
-//! says which values a key allows; `Value` is a value that has passed this check.
+//! says which values a key allows, and checks them; `Value` is a value that has passed the check.
 
 use serde_json::Value as Json;
 

@@ -1,7 +1,7 @@
-//! The use of a connection: counts its requests that are being answered, and notes the time of the
-//! last answer. `accept.rs` closes a connection that is idle for too long. Otherwise a client that
-//! answers pings and sends nothing else could keep an HTTP/2 connection open for ever. It would
-//! count towards the limit on open connections, so that others might find none free.
+//! The use of a connection: counts its requests that are being answered, and notes the time of the last answer.
+//! `accept.rs` closes a connection that is idle for too long. Otherwise a client that answers pings and sends nothing
+//! else could keep an HTTP/2 connection until `--connection-age-ms` ends it. It would count towards the limit on open
+//! connections, so that others might find none free.
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

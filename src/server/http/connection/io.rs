@@ -1,11 +1,9 @@
 //! A client's socket, with two timeouts that the HTTP libraries lack.
 //!
-//! 1. A client that stops reading its answer is disconnected after 30 s, and so is one that reads
-//!    it more slowly than `--least-rate-bytes` asks. Otherwise a client that reads a byte now and
-//!    then would keep its answer in memory.
-//! 2. After an answer that came before the upload ended (413), the rest of the upload is read and
-//!    thrown away for a moment. Closing at once would reset the connection, and the client would
-//!    never see the answer.
+//! 1. A client is disconnected if in 30 s it reads nothing of the answer that waits for it, or less than
+//!    `--least-rate-bytes` asks. Otherwise a client that reads a byte now and then would keep its answer in memory.
+//! 2. After an answer that came before the upload ended (such as a 413), the rest of the upload is read and thrown
+//!    away for a moment. Closing at once would reset the connection, and the client would never see the answer.
 
 use std::future::Future as _;
 use std::io;

@@ -1,9 +1,9 @@
 //! A request body that can be read on after its handler has stopped reading.
 //!
-//! A handler that refuses early (a full queue, a bad key) leaves the body unread. The rest must be
-//! read and thrown away before the connection can carry its next request. Where the rest is too
-//! long for that, the answer must announce that the connection closes: otherwise the client's next
-//! request would fail.
+//! A handler that refuses early (a full queue, a bad query) leaves the body unread. The rest must be read and thrown
+//! away before the connection can carry its next request. Where the rest is too long or too slow for that, or the
+//! client waits for `100 Continue` before it sends anything, the answer must announce that the connection closes:
+//! otherwise the client's next request would fail.
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};

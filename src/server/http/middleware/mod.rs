@@ -1,6 +1,6 @@
-//! Steps before and after the handlers. `observe` is around the whole router, and so is `cors`
-//! where origins are configured. `site`, `auth` and `rates`, in this order, may refuse requests for
-//! `/metrics` and for paths under `/v1`.
+//! Steps before and after the handlers. `observe` is around the whole router, and so is `cors` where origins are
+//! configured. `site`, `auth` and `rates`, in this order, may refuse requests for `/metrics` and for the routes under
+//! `/v1`.
 
 pub mod auth;
 pub mod cors;

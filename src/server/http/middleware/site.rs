@@ -2,8 +2,8 @@
 //! keys, whose only protection is that strangers cannot connect.
 //!
 //! A web page can make a browser that runs on the same machine connect: by a name that it lets mean 127.0.0.1 (DNS
-//! rebinding), or by a form that it posts across sites. So the host that is asked for must be a name of this machine, and
-//! a page that posts must come from it, or from an origin that `--cors-origins` allows.
+//! rebinding), or by a form that it posts across sites. So the host that is asked for must be a name of this machine,
+//! and a page that posts, puts or deletes must come from it, or from an origin that `--cors-origins` allows.
 
 use std::net::IpAddr;
 use std::sync::Arc;

@@ -1,6 +1,6 @@
-//! `Idempotency-Key`: a request that is sent again, because its answer was lost, makes no second
-//! job. This file reads the header and computes the digest of the request; `jobs/claims.rs` keeps
-//! name and digest as long as the job can be found.
+//! `Idempotency-Key`: a request whose result is fetched later makes no second job when it is sent again, because its
+//! answer was lost. This file reads the header and computes the digest of the request (`diff.rs` that of a
+//! comparison); `jobs/claims.rs` keeps name and digest as long as the job can be found.
 
 use std::sync::Arc;
 
@@ -70,7 +70,7 @@ pub fn name_of_mesh(name: &ClaimName, index: usize) -> ClaimName {
     ClaimName { owner: name.owner.clone(), key }
 }
 
-/// The digest of all that makes a job: files, query, document, and the picture's format if `Accept` decides it.
+/// The digest of all that makes a job: files, query, document, the picture's format by `Accept`, and the webhook.
 pub async fn digest(query: &Query, upload: &Upload, headers: &HeaderMap) -> Result<Digest, ApiError> {
     let (bundle, kind) = (upload.bundle.clone(), upload.kind);
     // A large body takes a while.

@@ -1,5 +1,5 @@
-//! The query of a request: how the mesh is read (`format_in`, `entry`), and keys of the request document in dotted form
-//! (`camera.azimuth_deg=30`).
+//! The query of a request: how the mesh is read (`format_in`, `entry`), and keys of the request document in dotted
+//! form (`camera.azimuth_deg=30`). `keys.rs` reads the other keys of a check or a comparison.
 
 use axum::extract;
 use axum::http::Uri;

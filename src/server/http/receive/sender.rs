@@ -1,6 +1,6 @@
 //! The sender of a request for a job: what it may do and see, the request's id, and the headers `Idempotency-Key` (a
 //! name for the job) and `Webhook` (an address that is told of its end). It also refuses, before the body is read, a
-//! request for which the queue or the memory has no room.
+//! request for which the queue or the memory has no room, unless it may need no worker.
 
 use std::sync::Arc;
 

@@ -1,5 +1,6 @@
-//! The name of an upload: the SHA-256 of its content. The same content gives the same name and the same list of files. So
-//! every picture of a stored mesh follows from its name and the request alone.
+//! The name of an upload: the SHA-256 of its bytes; of a form, that of the list of its files. The same content gives
+//! the same name and the same list of files. So every picture of a stored mesh follows from its name and the request
+//! alone.
 
 use std::sync::Arc;
 

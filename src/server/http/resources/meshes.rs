@@ -1,7 +1,7 @@
 //! `/v1/meshes`: stored meshes, which are sent once and drawn often.
 //!
-//! A stored mesh is its bytes alone. How they are read (`format_in`, `entry`) is part of each URL,
-//! so that a URL with its query always means the same.
+//! The name of a stored mesh follows from its files alone. How they are read (`format_in`, `entry`) is part of each
+//! URL, so that a URL with its query always means the same.
 
 use std::sync::Arc;
 

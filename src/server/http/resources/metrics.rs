@@ -1,4 +1,4 @@
-//! `/metrics`: counters and gauges in the text format of Prometheus.
+//! `/metrics`: counters, gauges and histograms in the text format of Prometheus.
 
 use std::sync::Arc;
 

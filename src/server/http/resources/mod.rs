@@ -1,8 +1,8 @@
 //! The handlers, one file per resource, and what several of them share: [`run`] waits for a worker,
 //! [`responses`] writes answers that more than one resource gives.
 //!
-//! A handler is named after its HTTP method, or after the end of its path where a file has several
-//! for one method. No handler computes: work goes to the job queue.
+//! A handler is named after its HTTP method, or after the end of its path where a file has several for one method. No
+//! handler parses a mesh or draws: such work goes to the job queue.
 
 pub mod events;
 pub mod front_page;

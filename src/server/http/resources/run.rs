@@ -1,4 +1,4 @@
-//! Jobs that a client waits for. When the client hangs up, its job stops.
+//! Runs interactive jobs: a client waits for the answer. When it hangs up, its job stops.
 
 use std::sync::Arc;
 

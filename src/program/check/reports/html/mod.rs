@@ -1,5 +1,5 @@
 //! The report of `meshsnap check` as one HTML page, which needs no network: a table of the files with a filter, and
-//! for each file its faults, its changes and its pictures.
+//! for each file its faults, its changes and its pictures. Pictures that would make the page too large are left out.
 
 use std::fmt::Write as _;
 

@@ -1,8 +1,8 @@
 //! Lists of numbered items (edges, or pieces of clipped triangles), one per band. A band is a range
 //! of pixel rows that one thread draws at a time.
 //!
-//! An item is in the list of each band that it touches. Items that touch many bands are listed once
-//! for all of them, which saves memory.
+//! An item is in the list of each band that it touches, but one that touches many bands is listed
+//! once for all of them, which saves memory.
 
 /// The items of one chunk, listed per band.
 #[derive(Default)]

@@ -1,9 +1,9 @@
 //! The sorting of triangles and edges into bands, before the stage visibility. A band is a range of pixel rows that
-//! one thread draws at a time. For each band, only the triangles and edges that touch it are looked at.
+//! one thread draws at a time. For each band, only the triangles and edges that touch it or its margin are looked at.
 //!
-//! Rims are the edges at which a surface ends on screen or turns away. If a pass of lines draws all edges of a
-//! surface, its rims are listed apart from its other edges, because few bands need the others (`lines/holes` draws
-//! most pixels without them). The others are sorted when the first band needs them.
+//! Rims are the edges at which a surface ends on screen or turns away. If `lines/holes` draws most pixels of a pass
+//! of lines from faces alone (`DrawPlan::has_holes_under`), the rims are listed apart from the other edges, because
+//! few bands need the others. These are sorted when the first band needs them.
 
 use std::ops::Range;
 use std::sync::OnceLock;

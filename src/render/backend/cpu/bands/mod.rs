@@ -1,5 +1,6 @@
-//! The drawing of one band, through all stages from visibility to resolve. A band is a range of pixel rows, most
+//! The drawing of one band, through the stages from visibility to resolve. A band is a range of pixel rows, most
 //! often so few that its buffers fit a core's cache. It depends on no other band, so threads draw several at a time.
+//! Occlusion alone looks at the whole picture: it is found between two runs over all bands.
 //!
 //! [`bins`] sorts triangles and edges into bands, [`scratch`] holds a band's buffers.
 

@@ -1,7 +1,7 @@
 //! The height of bands, and the buffers in which a thread draws one. A band is a range of pixel
-//! rows that one thread draws at a time. Bands are so high that their buffers fit a core's cache.
-//! They are higher if their lines look far beyond them, because each band draws the samples beyond
-//! it for itself.
+//! rows that one thread draws at a time. Bands are so high that their buffers fit a core's cache,
+//! but at least four rows. They are higher if their lines look far beyond them, because each band
+//! draws the samples beyond it for itself.
 //!
 //! Buffers that are not too large are kept for the next picture.
 

@@ -1,11 +1,11 @@
-//! The triangles that touch each band, before the stage visibility. A band is a range of pixel rows
-//! that one thread draws at a time. A [`TriangleBin`] has those of one chunk of the triangles, so
-//! that several threads can sort them.
+//! The triangles that touch each band or its margin, before the stage visibility. A band is a range of
+//! pixel rows that one thread draws at a time. A [`TriangleBin`] has those of one chunk of the
+//! triangles, so that several threads can sort them.
 //!
-//! There are separate lists of triangles that face the viewer, that face away, and that are thin,
-//! and of the pieces that are left of triangles after clipping. The stage visibility draws those
-//! that face away last, because most of them are hidden by then. The stage mixed looks for the thin
-//! ones, which samples may miss.
+//! There are separate lists of triangles that face the viewer, of those that face away, and of the
+//! pieces that are left of triangles after clipping. The stage visibility draws those that face away
+//! last, because most of them are hidden by then. If samples are adaptive, thin triangles, which
+//! samples may miss, are also in a list of their own: the stage mixed looks for them.
 
 use std::ops::Range;
 

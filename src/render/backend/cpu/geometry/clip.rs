@@ -1,5 +1,5 @@
-//! Clipping of triangles (before the stage visibility) and of edges (in the stage lines) that reach
-//! behind the eye or far outside the picture: it cuts off what cannot be drawn. Twin of
+//! Clipping of triangles (for the stage visibility) and of edges (for the stage lines) that reach
+//! behind the near plane or far outside the picture: it cuts off what cannot be drawn. Twin of
 //! `shaders/geometry/clip.wgsl`.
 
 use super::transform::{ScreenVertex, recip, round_to_i32};

@@ -2,7 +2,7 @@
 //! sample is one of the 1 to 16 places in a pixel at which the picture is computed.
 //!
 //! - [`transform`] moves vertices to screen coordinates, which are rounded to 1/256 px.
-//! - [`clip`] cuts off what reaches behind the eye.
+//! - [`clip`] cuts off what reaches behind the near plane, or far outside the picture.
 //! - [`visibility`] finds the samples that a triangle covers, [`batch`] does so for many triangles.
 //!   [`setups`] prepares these eight at a time.
 //! - [`nearest`] keeps the nearest triangle of each sample in the buffer of [`samples`].

@@ -1,10 +1,11 @@
 //! The set-up of eight triangles at a time, in vector instructions (stage visibility): from their
-//! corners it computes the pixels that each may touch, its edge functions and its depth plane.
+//! corners it computes the pixels whose samples each may cover, its edge functions and its depth
+//! plane.
 //!
-//! Values are those of [`visibility`](super::visibility), which sets up one triangle at a time.
-//! Edge functions of triangles up to [`EXTENT_MAX`] wide and high fit 32 bits. Those of these
-//! triangles that touch at most [`SHORT_MAX`] columns and rows of pixels are drawn as a whole,
-//! others block by block.
+//! Edge functions of triangles up to [`EXTENT_MAX`] wide and high fit 32 bits. Of these triangles,
+//! those with all depths above 0 that touch at most [`SHORT_MAX`] columns and rows of pixels are
+//! drawn as a whole. Their values are those of [`visibility`](super::visibility), which sets up one
+//! triangle at a time. Others are drawn block by block.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x4, i32x8, mask32x8};

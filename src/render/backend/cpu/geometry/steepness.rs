@@ -1,5 +1,6 @@
-//! Numbers for comparisons of depths: the tolerance for rounding, and the steepness of a triangle, which is how much
-//! its depth changes per 1/256 px on screen. Twin of `shaders/geometry/steepness.wgsl`.
+//! Numbers for comparisons of depths: the tolerance for rounding, and the steepness of a triangle, which is the
+//! change of its depth per 1/256 px to the right plus that per 1/256 px down. Twin of
+//! `shaders/geometry/steepness.wgsl`.
 
 use super::transform::{ScreenVertex, homogeneous, recip};
 use crate::backend::cpu::context::RasterContext;

@@ -1,8 +1,8 @@
 //! The samples that a triangle covers, and its depth at each (stage visibility). Twin of
 //! `shaders/geometry/visibility.wgsl`.
 //!
-//! Coverage is exact integer arithmetic on vertices that are rounded to 1/256 px, with the top-left rule: of two
-//! triangles that share an edge, every sample belongs to exactly one. Depth is evaluated from integer offsets, never
+//! Coverage is exact integer arithmetic on vertices that are rounded to 1/256 px, with the top-left rule: a sample on
+//! the edge between two triangles belongs to exactly one of them. Depth is evaluated from integer offsets, never
 //! incrementally, so it does not depend on where a traversal began.
 
 use super::samples::SampleBand;

@@ -1,8 +1,8 @@
 //! A quick selection of the triangles that may hide an edge, eight at a time (stage lines).
 //!
 //! Most triangles along an edge hide nothing of it: the edge is one of their sides, or they lie beside it or behind
-//! it. These are rejected here, by the same operations as at the start of [`hidden_by`](super::hidden_lines). The few
-//! that remain are tested one by one.
+//! it. Most of these are rejected here, by the same operations as at the start of [`hidden_by`](super::hidden_lines).
+//! The triangles that remain are tested one by one.
 
 use super::segment::Segment;
 use crate::backend::cpu::context::RasterContext;

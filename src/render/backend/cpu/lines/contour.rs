@@ -1,6 +1,7 @@
 //! The decision whether an edge is drawn in this view (stage lines). A pass of contours keeps only silhouettes, the
-//! edges at which the surface ends on screen or turns away. On closed surfaces an edge is dropped if all its faces
-//! face away from the viewer. Twin of `shaders/lines/contour.wgsl`.
+//! edges at which the surface ends on screen or turns away. An edge is dropped if all its faces show the viewer a
+//! side that is known to be hidden, as the inside of a closed surface is ([`LinePass::unseen_side`]). Also the choice
+//! of the face that lights an edge's line. Twin of `shaders/lines/contour.wgsl`.
 
 use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous};

@@ -1,5 +1,6 @@
-//! A special case of hidden lines: edges that lie in the plane of a triangle which hides the edges' own faces (stage
-//! lines). Such a triangle hides the edge, too. Twin of `shaders/lines/coplanar.wgsl`.
+//! A special case of hidden lines: edges that lie in the plane of a triangle and whose own faces all lie behind it
+//! (stage lines). Such a triangle hides the edge, too, except close to the triangle's sides, and in meshes in which
+//! an edge has more than two faces. Twin of `shaders/lines/coplanar.wgsl`.
 //!
 //! An example is the edge at which a wall stands on a floor: it lies in the floor's plane. Seen from above the edge
 //! is visible, and hidden-line removal keeps it however depths are rounded. Seen from below, the floor hides the

@@ -1,14 +1,16 @@
 //! The share of a pixel that lines cover, and the compositing of their colour over the pixel (stage lines). Twin of
 //! `shaders/lines/coverage.wgsl`.
 //!
-//! A stroke is the area that one edge's line covers, and a pixel is covered by the union of its strokes. A pixel has
-//! 256 coverage points, which show where strokes overlap. Four integers per pixel describe all its strokes: the sum
-//! of their areas, the sum of the numbers of points in them, the mask of the points that any of them covers, and the
-//! largest difference between a stroke's area and its points. Integers can be summed in any order, so the result does
-//! not depend on the order of the strokes.
+//! A stroke is the area that the line along one part of an edge covers, and a pixel is covered by the union of its
+//! strokes. A pixel has 256 coverage points, which show where strokes overlap. Four values per pixel describe all its
+//! strokes: the sum of their areas, the sum of the numbers of points in them, the mask of the points that any of them
+//! covers, and the largest difference between a stroke's area and its points. All are integers or bits, so the result
+//! does not depend on the order of the strokes.
 //!
 //! If strokes do not overlap, the coverage is the sum of their areas. If they overlap, the sum is scaled by the
-//! number of points that any stroke covers over the sum of the strokes' points ([`LineCoverage::covered_share`]).
+//! number of points that any stroke covers over the sum of the strokes' points. The result may differ from the
+//! union's points by at most four times that largest difference ([`LineCoverage::covered_share`]). Where
+//! [`holes`](super::holes) tell the coverage, there are no strokes.
 
 use super::holes::Holes;
 use super::stroke::{Amount, Mask, POINTS, WORDS, count};
@@ -44,9 +46,8 @@ pub struct LineCoverage {
 }
 
 impl LineCoverage {
-    /// True if all points are covered: further strokes change nothing unless the peak is below 1.
-    /// One stroke may cover all points and yet miss a corner of the pixel, so that at least two
-    /// must.
+    /// True if all points are covered: further strokes change nothing. One stroke may cover all
+    /// points and yet miss a corner of the pixel, so that at least two must.
     #[inline(always)]
     pub fn is_full(&self) -> bool {
         self.count > POINTS && self.mask == [u16::MAX; WORDS]

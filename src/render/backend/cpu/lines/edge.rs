@@ -1,9 +1,10 @@
 //! The drawing of an edge as a line of exact width (stage lines). Twin of `shaders/lines/edge.wgsl`.
 //!
-//! A line is all that lies within half its width of the visible parts of an edge, which
-//! [`hidden_lines`](super::hidden_lines) finds. Each part is a [`stroke`], and in each pixel the union of all strokes
-//! counts ([`coverage`](super::coverage)). Long edges are processed in windows, which are stretches of some pixels,
-//! so that a pixel's lines depend only on what is near it.
+//! A line is all that lies within half its width of the parts of an edge that its pass draws: all, or only the
+//! visible or the hidden ones, which [`hidden_lines`](super::hidden_lines) finds. Each part is a [`stroke`], and in
+//! each pixel the union of all strokes counts ([`coverage`](super::coverage)). Where something may hide them, long
+//! edges are processed in windows, which are stretches of some pixels, so that a pixel's lines depend only on what is
+//! near it.
 
 use super::farthest::Farthest;
 use super::holes::Holes;

@@ -1,5 +1,6 @@
-//! The depth of the farthest corner of all triangles that are visible in a pixel (stage lines). An edge that is
-//! farther away than this in every pixel along it is hidden, and no triangle has to be tested.
+//! The depth of the farthest corner of all triangles that are visible in a pixel (stage lines). It counts as
+//! infinitely far if a sample shows no triangle, or one that is clipped. An edge whose nearest point is farther away
+//! than this in every pixel along it is hidden, and no triangle has to be tested.
 
 use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
@@ -18,8 +19,8 @@ pub struct Farthest {
 /// The depth of a pixel that was not asked for yet.
 const UNKNOWN: f32 = f32::INFINITY;
 
-/// The depth of a pixel in which something is missing: a triangle, or one of its corners, which
-/// lies behind the eye. It is farther than any edge.
+/// The depth of a pixel in which something is missing: a triangle, or one of its corners on screen. It is farther than
+/// any edge.
 const MISSING: f32 = f32::NEG_INFINITY;
 
 impl Farthest {

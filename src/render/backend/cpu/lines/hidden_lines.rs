@@ -1,9 +1,9 @@
 //! Hidden-line removal (stage lines): it finds the intervals of an edge that triangles hide, and from them the
-//! visible ones. Twin of `shaders/lines/hidden_lines.wgsl`.
+//! visible ones, of which very short ones are dropped. Twin of `shaders/lines/hidden_lines.wgsl`.
 //!
 //! On screen an edge and a triangle are straight and their depths are affine, so what a triangle hides of an edge is
 //! an interval. Candidates are the triangles that the visibility buffer (the nearest triangle of each sample) shows
-//! along the edge.
+//! along the edge. If these hide a part of it, the triangles up to a pixel beside it are candidates, too.
 
 use super::candidates::Candidates;
 use super::contour::volume;

@@ -3,8 +3,8 @@
 //!
 //! Light changes a colour by a factor and a summand ([`Light`]), so one light per pixel does for lines of all
 //! colours. It is the mean of the light at those samples that show the surface. If no sample does, as just outside a
-//! silhouette, it is the light on the line's own face. Normal and roughness textures do not change the light on
-//! lines.
+//! silhouette, it is the light on a face beside the line's edge. Textures and darkened hollows (stage occlusion) do
+//! not change the light on lines.
 
 use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;

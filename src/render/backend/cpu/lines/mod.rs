@@ -4,12 +4,13 @@
 //! screen, and [`hidden_lines`] finds the intervals to draw ([`farthest`], [`candidates`] and
 //! [`coplanar`] help it). Each interval is a [`stroke`]: the area within half the line's width of
 //! it. Between its ends, its area in a pixel comes from [`profile`]. [`coverage`] unites a pixel's
-//! strokes and composites them over the colours, under the light of [`line_light`]. Twins are in
-//! `shaders/lines/`.
+//! strokes and composites them over the colours, under the light of [`line_light`]. Twins of most
+//! are in `shaders/lines/`.
 //!
-//! Where all edges of a surface are drawn, most pixels need no strokes: [`holes`] finds the parts
-//! of faces that lines leave free, and all else is covered. Mainly the pixels near rims, where the
-//! surface ends on screen, get strokes then.
+//! Where all edges of an opaque surface are drawn, most pixels need no strokes
+//! ([`has_holes_under`](crate::plan::DrawPlan::has_holes_under) has all conditions): [`holes`]
+//! finds the parts of faces that lines leave free, and all else is covered. Mainly the pixels near
+//! rims, where the surface ends on screen, get strokes then.
 
 pub(crate) mod candidates;
 pub(crate) mod contour;

@@ -1,9 +1,9 @@
 //! The drawing of lines without any shortcut, for tests that compare its pictures with those of the
 //! fast code. Programs are built without it: see [`RasterContext::is_plain`].
 //!
-//! Hidden-line removal tests every triangle that is visible along an edge, one by one. What a line
-//! covers is computed for every pixel around it. What lines leave free of faces is looked for pixel
-//! by pixel.
+//! Hidden-line removal tests every triangle that is visible along an edge, one by one, unless all
+//! of them lie in front of the edge. What a line covers is computed for every pixel around it. What
+//! lines leave free of faces is looked for pixel by pixel.
 
 use super::edge::{LineDrawer, LineTarget, Piece, Window};
 use super::hidden_lines::{HiddenIntervals, hidden_by};

@@ -29,8 +29,7 @@ pub const GAUSS_OUTER: f32 = 5.0 / 18.0;
 pub const GAUSS_MIDDLE: f32 = 8.0 / 18.0;
 
 impl Profile {
-    /// A profile of a line with this unit normal, half as wide as `half_width` with a ramp half as
-    /// wide as `half_ramp`, pixels.
+    /// A profile of a line with this unit normal, by half of its width and half of its ramp's, pixels.
     #[inline(always)]
     pub fn new(half_width: f32, half_ramp: f32, normal: [f32; 2]) -> Self {
         let (nx, ny) = (normal[0].abs(), normal[1].abs());

@@ -1,5 +1,5 @@
-//! An edge on screen: its ends, its depth at each point along it, and the pixels that it passes (stage lines). Twin
-//! of `shaders/lines/segment.wgsl`.
+//! An edge on screen: its ends, its depth at each point along it, and the pixels along it (stage lines). Twin of
+//! `shaders/lines/segment.wgsl`.
 
 use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::clip::clip_segment;
@@ -31,7 +31,7 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// None where the edge is out of the picture.
+    /// None if an end is outside and the plan does not clip, or clipping leaves nothing of the edge.
     #[inline(always)]
     pub fn new(context: &RasterContext<'_>, edge: &Edge) -> Option<Self> {
         let [a, b] = edge.vertices.map(|v| context.vertices[v as usize]);

@@ -5,7 +5,8 @@
 //! long sides cross the pixel, its area follows from a formula for strips (`profile`). Elsewhere
 //! the number of covered points gives its area. The mask tells which of the pixel's [`POINTS`]
 //! points, a rank-1 lattice, the stroke covers. It is found in integers, so that both back-ends
-//! agree to the bit. [`coverage`](super::coverage) needs the mask to unite strokes that overlap.
+//! agree to the bit. If lines have a soft ramp (`smoothing`), each word of the mask has a width of
+//! its own. [`coverage`](super::coverage) needs the mask to unite strokes that overlap.
 
 use super::profile::Profile;
 use crate::backend::cpu::geometry::transform::{round_to_i32, rsqrt};

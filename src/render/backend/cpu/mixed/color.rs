@@ -1,8 +1,9 @@
 //! The colour of a mixed pixel, which is drawn a second time, from 64 or 256 points (stage mixed). It follows from
 //! the triangles that are visible at the points.
 //!
-//! Each visible triangle is shaded once, at the mean position of its points. Its colour weighs as much as its share
-//! of the points. A triangle of a metal that mirrors sharply is shaded once in each quarter of the pixel.
+//! Each visible triangle is shaded once, at the mean position of its points, unless its colour is known already. Its
+//! colour weighs as much as its share of the points. A triangle with vertex normals, of a metal that mirrors sharply,
+//! is shaded once in each quarter of the pixel in which it has points.
 
 use std::ops::ControlFlow;
 

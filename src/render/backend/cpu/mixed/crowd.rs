@@ -1,8 +1,8 @@
 //! The nearest triangle at each point of a mixed pixel, kept as one depth and one id per point
 //! (stage mixed). Mixed pixels are drawn a second time, from 64 or 256 points each, because faces
-//! of different colours meet there.
+//! of different colours meet in or near them.
 //!
-//! This serves pixels that show more faces than [`faces`](super::faces) has room for or have more
+//! This serves pixels with more faces than [`faces`](super::faces) has room for, or with more
 //! triangles than a list holds. The renderer without shortcuts, with which tests compare, uses it
 //! for all mixed pixels.
 

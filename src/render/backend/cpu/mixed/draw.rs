@@ -1,7 +1,8 @@
 //! The stage mixed for one band (a range of pixel rows): it finds the band's mixed pixels and computes their colours.
 //!
-//! A mixed pixel is one in which, or beside which, faces of different colours meet. The few samples that all pixels
-//! have are not enough there. So its colour is computed once more, from 64 or 256 points.
+//! A mixed pixel is one in which, or beside which, faces of different colours meet, and in which no transparent layer
+//! is visible. The few samples that all pixels have are not enough there. So its colour is computed once more, from
+//! 64 or 256 points.
 
 use super::band_triangles::BandTriangles;
 use super::color::{MixedColors, color};

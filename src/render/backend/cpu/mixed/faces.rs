@@ -1,10 +1,10 @@
 //! The faces that are visible in a mixed pixel, each with the set of the pixel's points at which it is the nearest
 //! (stage mixed). Mixed pixels are drawn a second time, from 64 or 256 points each, because faces of different
-//! colours meet there.
+//! colours meet in or near them.
 //!
-//! Faces are added one by one. Two faces are compared once if the depth ranges that they have in the pixel do not
-//! overlap, and point by point otherwise. A pixel has at most 16 faces here; [`crowd`](super::crowd) takes pixels
-//! with more, and has the same result.
+//! Faces are added one by one. Two faces that cover the same points are compared once if the depth ranges that they
+//! have in the pixel do not overlap, and point by point otherwise. A pixel has at most 16 faces here;
+//! [`crowd`](super::crowd) takes pixels with more, and has the same result.
 
 use super::points::PointSet;
 use super::shares::{Share, Shares};

@@ -1,6 +1,6 @@
 //! Lists of the triangles that may be visible in each mixed pixel (stage mixed). Mixed pixels are
 //! drawn a second time, from 64 or 256 points each. To bound their memory, lists are made for at
-//! most 4096 of these pixels at a time.
+//! most 4096 of these pixels at a time, and for fewer where lists are long.
 
 use std::ops::Range;
 

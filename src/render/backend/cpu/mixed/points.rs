@@ -1,6 +1,6 @@
 //! The points from which a mixed pixel is drawn, and sets of these points as bits (stage mixed). The points are a
 //! rank-1 lattice of 256 points, or every fourth of them. Mixed pixels are drawn a second time, because faces of
-//! different colours meet there.
+//! different colours meet in or near them.
 
 use crate::backend::cpu::geometry::samples::SampleGrid;
 use crate::backend::sample_partition::{GENERATORS, POINTS};

@@ -1,6 +1,6 @@
 //! The visible triangles of a mixed pixel, each with its share of the pixel: the set of the points that show it
 //! (stage mixed). Mixed pixels are drawn a second time, from 64 or 256 points each, because faces of different
-//! colours meet there.
+//! colours meet in or near them.
 
 use super::points::PointSet;
 use crate::backend::sample_partition::POINTS;

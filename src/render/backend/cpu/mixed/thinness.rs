@@ -1,6 +1,6 @@
 //! The test whether a triangle is so thin that it may lie between samples: at least a pixel long, less than a pixel
-//! high, and at least four times as long as high (stage mixed). Pixels with such triangles may be drawn a second
-//! time, from more points.
+//! high, and at least four times as long as high (stage mixed). The length is the larger extent, across or down;
+//! twice the area over it is the height. Pixels with such triangles may be drawn a second time, from more points.
 
 /// A thin triangle is this many times as long as it is high, or more.
 pub const ASPECT: i32 = 4;

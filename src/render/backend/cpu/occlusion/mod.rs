@@ -2,7 +2,7 @@
 //! depths of the whole picture.
 //!
 //! `grid` keeps the depth of each pixel's first sample as a distance in pixels. `gather` adds up the light that
-//! surfaces around a pixel block. `spread` smooths this by means over neighbours that show the same surface.
+//! surfaces around a pixel block. `spread` smooths this by means over neighbours at about the same depth.
 
 pub mod gather;
 pub mod grid;

@@ -1,5 +1,5 @@
-//! The smoothing of the darkness of hollows, by a weighted mean over the neighbours that show the
-//! same surface (stage occlusion, screen-space ambient occlusion). Neighbours looked at different
+//! The smoothing of the darkness of hollows, by a weighted mean over the neighbours at about the
+//! same depth (stage occlusion, screen-space ambient occlusion). Neighbours looked at different
 //! places in `gather`, so their values differ even on a smooth surface. The mean also gives a value
 //! to the pixels between those that `gather` computes. Twin of `shaders/occlusion/spread.wgsl`.
 

@@ -1,4 +1,4 @@
-//! Debug views, which show a triangle's numbers as colours: barycentric coordinates, normals, texture coordinates and
+//! Debug views, which show data of triangles as colours: barycentric coordinates, normals, texture coordinates and
 //! others (stage shade, per point). Twin of `shaders/surface/debug.wgsl`.
 
 use super::barycentric::{Corners, edge_distances_px};

@@ -1,7 +1,8 @@
 //! The shading of triangles whose colour is the same all over, because their material has no
 //! textures, smooth normals and the like (stage shade). Each colour is found once, eight triangles
-//! at a time, and pixels look it up. This is used for pictures in which all materials are like
-//! this, if they have neither transparent layers nor darkened hollows (stage occlusion).
+//! at a time, and pixels look it up; colours of clipped triangles are found per pixel. This is used
+//! for pictures in which all materials are like this, if they have neither transparent layers nor
+//! darkened hollows (stage occlusion).
 
 use super::flat_colors::{FlatColors, UNKNOWN};
 use super::flat_lanes;

@@ -1,6 +1,7 @@
-//! SIMD helpers of `flat`, which shades triangles that have one colour all over (stage shade): they gather the normals of
-//! eight triangles, store their eight colours in the table, and average the colours of a pixel's samples. They are written
-//! with explicit vectors because compilers make slower code from plain loops, with branches and one value at a time.
+//! SIMD helpers of `flat`, which shades triangles that have one colour all over (stage shade): they gather the
+//! normals of eight triangles, store their eight colours in the table, and average the colours of a pixel's samples.
+//! They are written with explicit vectors because compilers make slower code from plain loops, with branches and one
+//! value at a time.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x4, f32x8, i32x8, mask32x4, mask32x8, u32x8};

@@ -1,10 +1,11 @@
 //! The stage shade: from visible samples to colours.
 //!
 //! The samples of a pixel that show the same triangle form a group, which is shaded once, at the mean of its
-//! samples. [`together`] finds the groups of eight pixels at a time, and [`shade`] those of a single pixel. Groups
-//! of a band are [`waiting`] until [`point`] shades many of them together. It uses the formulas of [`barycentric`]
-//! coordinates, [`texture`] lookups, the [`normal`], [`light`], [`occlusion_texture`], [`wire`] and [`debug`]
-//! views. `flat` serves pictures in which each triangle has one colour. Twins are in `shaders/surface/`.
+//! samples. (Metals that may mirror sharply can have a group in each quarter of a pixel: see [`shade`].) [`together`]
+//! finds the groups of eight pixels at a time, which are [`waiting`] until [`point`] shades many of them together.
+//! [`shade`] finds those of a single pixel. [`point`] uses the formulas of [`barycentric`] coordinates, [`texture`]
+//! lookups, the [`normal`], [`light`], [`occlusion_texture`], [`wire`] and [`debug`] views. `flat` serves pictures in
+//! which each triangle has one colour and none is transparent. Twins are in `shaders/surface/`.
 
 pub(crate) mod barycentric;
 pub(crate) mod debug;

@@ -1,6 +1,6 @@
-//! Normals of shaded points, by which they are lit: those of faces or vertices, those computed from positions in
-//! neighbouring pixels, and those changed by normal textures (stage shade). They are computed for `N` points side by
-//! side. Twin of `shaders/surface/normal.wgsl`.
+//! Normals of shaded points, for light and for opacity that depends on the angle of view: those of faces or vertices,
+//! those computed from positions in neighbouring pixels, and those changed by normal textures (stage shade). They are
+//! computed for `N` points side by side. Twin of `shaders/surface/normal.wgsl`.
 
 use super::barycentric::Quad;
 use super::texture::{blend, of_corners, uv_corners};

@@ -3,8 +3,8 @@
 //!
 //! Samples of a pixel that show the same triangle are shaded once, at their mean position
 //! ([`point`](super::point)). The colour is weighted by their share of the pixel's samples. With
-//! adaptive samples, metals that mirror sharply and have vertex normals are shaded once in each
-//! quarter of a pixel, because what they mirror changes within a pixel.
+//! adaptive samples, metals that may mirror sharply and have vertex normals are shaded once in
+//! each quarter of a pixel, because what they mirror changes within a pixel.
 
 use super::point::{PointShader, Show};
 use crate::backend::cpu::context::RasterContext;

@@ -1,6 +1,7 @@
 //! The search for the points to be shaded in eight pixels of a row at a time (stage shade). For
-//! each triangle that a pixel's samples show, there is one point at their mean position, with the
-//! triangle's share of the pixel. Points [wait](super::waiting) until many are shaded together.
+//! each triangle that a pixel's samples show, there is one point at their mean position, or one in
+//! each quarter of the pixel (see `shade`), weighted by its share of the samples. Points
+//! [wait](super::waiting) until many are shaded together.
 //!
 //! In each pixel the colours of its triangles are summed up in the order of its samples.
 //! [`Shader::pixel`], which shades pixels that show an outline, sums them up in the same order, so

@@ -1,6 +1,6 @@
 //! The points of a band (a range of pixel rows) that wait to be shaded, and their shading (stage
-//! shade). When there are 32 of one material, or the next point has another material, they are
-//! shaded eight at a time and added to their pixels.
+//! shade). When there are 32 of one material, the next point has another material, or the band ends,
+//! they are shaded eight at a time and added to their pixels.
 
 use super::barycentric::{Barycentrics, Corners};
 use super::point::{Points, Show, is_smooth};

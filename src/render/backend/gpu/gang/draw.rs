@@ -1,6 +1,6 @@
 //! The GPU commands that draw a gang (several jobs, one picture each, whose work is done by the same dispatches):
-//! input is uploaded once, each job has its own part of every buffer that kernels write, and the finished pictures
-//! lie one after the other in one buffer, where the CPU reads them.
+//! shared input is uploaded once, each job has its own part of every buffer that kernels write, and the finished
+//! pictures lie one after the other in one buffer, where the CPU reads them.
 
 use std::sync::Arc;
 

@@ -1,10 +1,10 @@
-//! The order in which jobs that could be drawn together get their turns: each is drawn alone at once, or waits for a
-//! short time and is then drawn in a gang (jobs that share dispatches).
+//! The order in which jobs that could be drawn together get their turns: each is drawn alone at once, or waits and is
+//! then drawn in a gang (jobs that share dispatches).
 //!
 //! Of jobs that are alike, the first are drawn at once, each alone. Later ones wait while [`LEADERS`] jobs or gangs
 //! of their kind are being drawn. When one of those is finished, the job that has waited longest becomes the leader
-//! of the next gang: it draws for all that wait, as many as fit into a gang. So a job never waits only for others to
-//! come, and the more jobs there are, the larger the gangs.
+//! of the next gang: it draws for all of its kind that wait, as many as fit into a gang. So a job never waits only
+//! for others to come, and the more jobs there are, the larger the gangs.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};

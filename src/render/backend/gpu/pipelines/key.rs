@@ -1,7 +1,8 @@
-//! The pipeline key: one bit for each feature of a plan (what is to be drawn for one picture) that decides which code
-//! draws it, such as textures, lines or the number of samples.
+//! The pipeline key: bits for the features of a plan (what is to be drawn for one picture) that decide which code
+//! draws it, such as textures, lines or the number of samples, and one bit for gangs.
 //!
-//! It is the constant `PIPELINE_KEY` of each pipeline, so that a kernel contains only the code that its plan needs.
+//! The bits on which a kernel depends are the constant `PIPELINE_KEY` of its pipeline, so that the pipeline contains
+//! only the code that its plan needs.
 
 use crate::plan::{DrawPlan, SurfacePass, flags, slots};
 

@@ -1,5 +1,5 @@
 //! The compute pipelines of a GPU: kernels (compute shaders) compiled for the features that a
-//! picture has. A pipeline is made when a picture first needs it, and kept for those that follow.
+//! picture has. A pipeline is made when it is first asked for, and kept for the pictures that follow.
 //!
 //! Also the list of all kernels, and that of the buffers with their binding numbers.
 

@@ -1,5 +1,5 @@
-//! The removal of code that a pipeline never runs, before a driver sees it: blocks `if has(FLAG)` in a shader
-//! whose flag is not in the pipeline's key (the features that the pipeline is compiled for).
+//! The removal of code that a pipeline never runs, before a driver sees it: blocks of a shader that begin with
+//! `if has(FLAG)` and whose flag is not in the pipeline's key (the features that the pipeline is compiled for).
 //!
 //! A driver also removes what a constant switches off. But Mesa's first copies functions to each place that calls
 //! them, even to places that it then removes. So it would copy the code of texture lookups five times, even for

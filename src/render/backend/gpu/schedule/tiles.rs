@@ -1,10 +1,11 @@
-//! The division of triangles among threads and workgroups of the GPU. A small triangle is drawn by one thread. A large
-//! one goes to a work list, and is drawn in tiles of 64 x 64 pixels by one workgroup; a huge one by all workgroups. Where a
-//! hardware GPU has few triangles to draw, each may get workgroups of its own, whatever its size, without a list.
+//! The division of triangles among threads and workgroups of the GPU. A small triangle is drawn by one thread. A
+//! large one, or a piece that clipping has left of one, goes to a work list, and is drawn in tiles of 64 x 64 pixels
+//! by one workgroup; a huge one by all workgroups. Where a hardware GPU has few triangles to draw, each may get
+//! workgroups of its own, whatever its size, without a list.
 //!
-//! This file decides from which size a triangle is large, whether triangles are few, and whether the work list is drawn in
-//! one run of its kernel or in several. There are several where one run might take so long that the device cuts loops off
-//! (llvmpipe does), or that the deadline passes.
+//! This file decides from which size a triangle is large, whether triangles are few, and whether the work list is
+//! drawn in one run of its kernel or in several. There are several where one run might take so long that the device
+//! cuts loops off (llvmpipe does), or that the deadline passes.
 
 use super::PIECES_MAX;
 use super::sizes::{ALONE_SIZE, Banding, DeviceTraits};

@@ -1,7 +1,7 @@
 //! The types that an accessor may have, by its use: the element type, the component type, and
 //! whether its integers are normalised (stand for 0 to 1, or for -1 to 1). They follow glTF 2.0,
-//! 3.7.2.1 (attributes), 3.7.3.1 (skins), 3.11 (animations); KHR_mesh_quantization adds small
-//! integers.
+//! 3.7.2.1 (attributes), 3.7.3 (skins), 3.11 (animations), and EXT_mesh_gpu_instancing.
+//! KHR_mesh_quantization adds small integers.
 
 use crate::import::MeshError;
 

@@ -3,7 +3,7 @@
 //! <https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_meshopt_compression>
 //!
 //! The `meshopt` crate unpacks, which is exact. The filters that are then applied to the unpacked
-//! values are our own, because those of the crate use a square root that differs between
+//! values are our own, because some filters of the crate use a square root that differs between
 //! processors.
 
 use super::meshopt_filters as filters;

@@ -1,6 +1,6 @@
 //! The decompression, in another process, of buffer views that meshoptimizer has packed: a hostile
-//! file that makes the decoder crash there does no harm here. One order has many views, because
-//! each order costs a process.
+//! file that makes the decoder crash there does no harm here. One order can have many views,
+//! because each order costs a process.
 
 use super::meshopt::{DECODER, Packed, Unpacked, unpack};
 use crate::guard::{Panicked, guarded};

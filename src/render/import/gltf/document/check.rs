@@ -1,6 +1,7 @@
-//! The check of a whole glTF document (the JSON) before any binary data is read: references lead to
-//! something that exists, related sizes agree, and no node is its own ancestor. Binary data is
-//! checked where it is read, and materials where they are used.
+//! The check of a glTF document (the JSON) before any binary data is read: references lead to
+//! something that exists, related sizes agree, and no node is its own ancestor. Checked on use
+//! instead: the default scene, cameras, animations, the content of materials, and compressed and
+//! other binary data.
 
 use super::lists::{Index, Lists};
 use super::schema::{Attributes, Document, MeshJson, Node, mode};

@@ -1,6 +1,6 @@
 //! The parts of a glTF document that are parsed lazily: materials, textures, samplers, images,
 //! cameras and animations. An entry is parsed on first use, so that an odd value in an unused
-//! material does not refuse the file.
+//! material is no error.
 
 use crate::import::{MeshError, text};
 use serde::Deserialize;

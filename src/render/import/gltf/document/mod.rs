@@ -1,6 +1,6 @@
 //! The JSON document of a glTF file. Before it is parsed, its depth is measured and the memory that
 //! parsing will take is estimated, and both are checked against the limits. A file that requires an
-//! extension is refused, unless that is read or harmless.
+//! extension is refused, unless the extension is read, is harmless, or is reported in a warning.
 
 pub(crate) mod check;
 pub(crate) mod lists;

@@ -1,5 +1,6 @@
-//! The parts of a glTF document that are parsed at once: scenes, nodes, meshes, skins, accessors,
-//! buffer views and buffers. References among them are checked in [`super::check`].
+//! The parts of a glTF document that are parsed immediately, used or not: scenes, nodes, meshes,
+//! skins, accessors, buffer views and buffers. Most references among them are checked in
+//! [`super::check`].
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;

@@ -1,5 +1,6 @@
-//! The triangles, line segments and points of a glTF primitive, made from its vertex indices by its
-//! mode: lists, strips and fans of triangles; lists, strips and loops of lines; points.
+//! The triangles, line segments and points of a glTF primitive, made by its mode from its vertex
+//! indices, or from its vertices in order if it has none: lists, strips and fans of triangles;
+//! lists, strips and loops of lines; points.
 
 use crate::import::MeshError;
 use crate::import::context::Context;

@@ -2,8 +2,9 @@
 //! texture coordinate and a normal. Each combination of them becomes a vertex, anew in each run of
 //! faces with one material and one form of corner.
 //!
-//! The file's lists are taken as they are where corners have positions alone, and where all corners
-//! have equal indices and no value is broken (`uses_of_vertices`).
+//! The file's lists are taken as they are where corners have positions alone, and where
+//! (`uses_of_vertices`) the lists are equally long, all corners have one form and equal indices,
+//! and no texture coordinate or normal is broken.
 
 use super::{Names, Room};
 use crate::import::MeshError;

@@ -1,6 +1,7 @@
-//! The fast parsing of an OBJ face in its most frequent form: all corners are written in the same
-//! one of the four ways `v`, `v/vt`, `v//vn` and `v/vt/vn`, and no index has more than nine digits.
-//! Any other face is left to `statement`.
+//! The fast parsing of an OBJ face in its most frequent form: three or more corners and nothing
+//! else, all written in the same one of the four ways `v`, `v/vt`, `v//vn` and `v/vt/vn`, with
+//! indices of at most nine digits. Any other face is left to `statement`, as are relative indices
+//! while the counts before the part are unknown.
 
 use super::decimal::whole;
 use super::{CORNERS_PER_POLL, Parser, PartError};

@@ -1,4 +1,4 @@
-//! The parsing of one number in an OBJ text, a coordinate or an index. From the byte where the
+//! The fast parsing of one number in an OBJ text, a decimal or an index. From the byte where the
 //! number begins, its value and the byte where it ends are found in one pass, because nearly all of
 //! an OBJ file is numbers.
 

@@ -1,9 +1,9 @@
 //! Lists (of positions, normals, corners ...) that a part of an OBJ text fills while it is parsed.
-//! One block of memory is reserved for the whole text, by an estimate, and each part fills its own
-//! place in it.
+//! For each list one block of memory is reserved for the whole text, by an estimate, and each part
+//! fills its own place in it.
 //!
-//! If the estimate is right, the block is the finished list and nothing is copied. Items that find
-//! no room go to a list beside the block, and then all are copied into a new one.
+//! Items that find no room go to a list beside the block. If each place is filled exactly, the
+//! block is the finished list and nothing is copied. Otherwise all items are copied into a new one.
 
 use crate::parallel::concat_slices;
 

@@ -1,5 +1,5 @@
 //! The parser of one part of an OBJ text. Lines in their most frequent form are parsed byte by
-//! byte, in one pass. All others go to [`statement`], which is slower: it splits a line into words.
+//! byte. All others go to [`statement`], which is slower: it splits a line into words.
 
 mod corners;
 mod decimal;

@@ -1,5 +1,6 @@
-//! The fast parsing of `v`, `vn` and `vt` lines of OBJ in their most frequent form: decimals with
-//! white space between them. Any other line is left to `statement`.
+//! The fast parsing of `v`, `vn` and `vt` lines of OBJ in their most frequent form: three decimals
+//! (for `vt` also two, for `v` six in a file with colours) with white space between them. Any other
+//! line is left to `statement`.
 
 use super::Parser;
 use super::decimal;

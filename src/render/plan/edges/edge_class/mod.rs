@@ -1,6 +1,6 @@
 //! Classes of edges, which say along which edges of a mesh lines are drawn: all edges, edges of the
-//! file's polygons, features (edges where the surface bends sharply or ends), creases, open edges, or
-//! non-manifold edges.
+//! file's polygons, features (edges where the surface bends sharply, ends or branches), creases (where it
+//! only bends sharply), open edges, or non-manifold edges.
 
 use crate::mesh::Mesh;
 use crate::mesh::creases::sharp_cos;

@@ -1,7 +1,8 @@
-//! The automatic width of wires (lines along the mesh's edges) whose thickness a request leaves open. It
-//! is 1 pixel. If the picture's edges lie so close that such lines would cover more than 35 % of the
-//! surface, all lines become thinner, down to 0.8 pixels. Wherever lines of that width cover more than
-//! 35 % of the surface around a place, they are [fainter](super::fade) there, so that the surface can be seen.
+//! The automatic width of wires along all edges of a mesh, or all edges of its polygons, whose thickness a
+//! request leaves open. It is 1 pixel. If the picture's edges lie so close that such lines would cover more
+//! than 35 % of the surface, all lines become thinner, down to 0.8 pixels. Wherever lines of that width cover
+//! more than 35 % of the surface around a place, they are [fainter](super::fade) there, so that the surface
+//! can be seen.
 
 mod features;
 mod open_edges;

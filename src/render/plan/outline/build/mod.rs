@@ -1,10 +1,9 @@
 //! The mesh that draws an outline. Beside each visible part of a silhouette edge, where a surface
 //! ends on screen, it has a quad as wide as the outline (an offset quad), and round joins at the
-//! corners between these quads.
+//! corners between these quads. Parts of chains that are too short have none (`chains`).
 //!
-//! Quads and joins cover all points within the outline's thickness of where the surface ends on
-//! screen, on the side where nothing of the surface is. Where a corner turns inwards the offset
-//! quads overlap.
+//! Quads and joins cover the points within the outline's thickness of these parts, on the side where
+//! nothing of the surface is. Where a corner turns inwards the offset quads overlap.
 
 use crate::plan::PlanError;
 use crate::plan::context::{CHECK_EVERY, PlanContext};

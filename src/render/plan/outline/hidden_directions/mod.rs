@@ -2,7 +2,7 @@
 //! silhouette edges there that these faces hide. Outlines need them at their corners.
 //!
 //! A round join fills the corner of an outline at a vertex where two silhouette edges meet. If both edges are
-//! visible, no face of the vertex lies in front of the join. But a contour can end inside the shape, at a cusp,
+//! visible, no face of the vertex lies in front of the join. But an outline can end inside the shape, at a cusp,
 //! where the surface folds. There the surface hides the second edge of the vertex, and the join is left out where
 //! the vertex's own faces cover it.
 

@@ -1,5 +1,5 @@
-//! The silhouette edges of a view: the edges where a surface ends on screen, because all faces at the
-//! edge lie on one side of it. The other, free side is found, too: the outline is drawn there.
+//! The silhouette edges of a view: the edges where a surface ends on screen, because all faces that are
+//! drawn at the edge lie on one side of it. The other, free side is found, too: the outline is drawn there.
 
 use std::sync::Arc;
 

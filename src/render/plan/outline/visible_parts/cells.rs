@@ -1,6 +1,6 @@
-//! A grid of square cells over the picture, and marks of some of its cells. They shorten the search
-//! for faces that hide an outline: `visible_parts` marks the cells along silhouette edges and
-//! beside them, and `grid` leaves out the faces that touch no marked cell.
+//! A grid of square cells over the picture, and marks of some of its cells. They shorten the search for
+//! faces that hide an outline: `visible_parts` marks the cells along silhouette edges and beside them,
+//! and `grid` leaves out the faces that are near no marked cell.
 
 use crate::plan::PX;
 

@@ -1,9 +1,9 @@
 //! The faces that may hide a part of an outline: those that lie near its edges on screen, listed by
 //! the cells of a grid over the picture.
 //!
-//! Cells are about as large as a usual face, so that a cell lists few faces. Only cells through
-//! which an edge goes, or in which `visible_parts` looks at a place beside an edge, list faces.
-//! Faces are clipped at the near plane before they are put on screen.
+//! There are about as many cells as faces, within limits, so that a cell lists few. Only cells through
+//! which an edge goes, or in which `visible_parts` looks at a place beside an edge, list faces. Faces
+//! are clipped at the near plane before they are put on screen.
 
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 

@@ -1,7 +1,7 @@
-//! The parts of silhouette edges that no face hides, beside which an outline is drawn. For each
-//! part it is also found how much of the outline's width is visible, and whether the background is
-//! beside it. Where there are too many pairs of edges and faces to compare, all parts count as
-//! visible.
+//! The parts of silhouette edges that no face hides, beside which an outline is drawn. For each part it
+//! is also found whether the background is beside it or the edge leaves the picture, and how much of
+//! the width is visible if the outline is a hull (a border around the surface). Where there is too much
+//! to compare, all edges count as visible.
 //!
 //! The depth test of the back-ends alone does not hide an outline. An outline is wider than the
 //! edge that it belongs to, and a face in front of the edge may recede faster than the outline

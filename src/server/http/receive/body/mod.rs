@@ -1,6 +1,6 @@
-//! The reading of a request's body within its limits: its size, the memory that all uploads share,
-//! its time, and its least speed. A body is one file (a mesh, or the request document for a stored
-//! one), a zip archive, or a form with files.
+//! The reading of a request's body within its limits: its size, the number of its files, the memory that all uploads
+//! share, its time, and its least speed. A body is one file (a mesh, or the request document for a stored one), a zip
+//! archive, or a form with files.
 
 pub mod sides;
 

@@ -1,4 +1,4 @@
-//! `POST /v1/check`: judges a mesh by rules, as `meshsnap check` does.
+//! `POST /v1/check`: judges a mesh by the rules of `meshsnap check`.
 
 use std::sync::Arc;
 

@@ -1,9 +1,10 @@
 //! Culling of triangles before they are sorted into bands (ranges of pixel rows that one thread draws at a time). It
-//! leaves out triangles that turn a side to the viewer that is not drawn, and triangles that no sample can show: they
-//! are seen edge-on, or lie outside the picture, or between the rows or columns of samples.
+//! leaves out triangles that the pass does not draw, or not from the side that the viewer sees, and triangles that no
+//! sample can show: they are seen edge-on, or lie outside the picture, or between the rows or columns of samples. If
+//! samples are adaptive, the points of mixed pixels count instead.
 //!
-//! Triangles that have to be clipped are listed apart. So are thin ones that samples may miss, if samples are
-//! adaptive: the stage mixed looks for them.
+//! Triangles that have to be clipped are listed apart. Thin ones that samples may miss are also in a list of their
+//! own, if samples are adaptive: the stage mixed looks for them.
 
 mod lanes;
 

@@ -1,6 +1,6 @@
 //! The farthest depth in each tile of 8 x 8 pixels, of the triangles that are drawn so far (stage visibility). A
-//! triangle behind that depth is hidden in the whole tile, and if it is hidden in all tiles that it touches, it need
-//! not be drawn.
+//! sample without a triangle counts as infinitely far. A triangle behind a tile's farthest depth is hidden in the
+//! whole tile, and if it is hidden in all tiles that it touches, it need not be drawn.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x4, i32x8, u32x8};

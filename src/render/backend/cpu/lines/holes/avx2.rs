@@ -1,6 +1,6 @@
-//! Helpers in AVX2 instructions for eight numbers at a time: they load corners of triangles, compute reciprocals,
-//! and collect signs as bits. The modules `inset` and `dig`, which find the areas of faces that lines leave free,
-//! share them.
+//! Helpers in AVX2 instructions for eight numbers at a time: they load corners of triangles, compute reciprocals, and
+//! collect signs as bits. The modules `inset` and `dig`, which find the areas of faces that lines leave free, use
+//! them.
 
 use std::arch::x86_64::*;
 

@@ -1,5 +1,6 @@
-//! The coverage points (256 per pixel) that lines leave free, in the pixels in which a sum of areas
-//! does not tell how much is free (stage lines). Twin of `shaders/lines/holes/free_points.wgsl`.
+//! The coverage points (256 per pixel) that lines leave free, in most of the pixels in which a sum
+//! of areas does not tell how much is free (stage lines). Twin of
+//! `shaders/lines/holes/free_points.wgsl`.
 //!
 //! If all edges of a surface are lines, each face is free only in its inset, the part that is at
 //! least half a line's width from all its sides. Areas of insets do not tell how much is free where
@@ -9,10 +10,10 @@
 //! edges at which the surface ends on screen or turns away, are drawn one by one; they cover the
 //! free points that they touch.
 //!
-//! This is exact for a point that is farther from all rims than half a line's width: a disc of that
-//! radius around it shows one face, or nothing, and contains the point's sample. Points that are
-//! nearer are covered by the rim's own line. For a few points the sample is a little farther away
-//! (docs/rasterizer.md, "Holes").
+//! This is exact for a point that is farther from all rims than half a line's width: if the point
+//! is free, the disc of that radius around it shows one face, or nothing, and contains the point's
+//! sample. Points that are nearer are covered by the rim's own line. For a few points the sample is
+//! a little farther away (docs/rasterizer.md, "Holes").
 
 use super::inset::{Inset, Insets};
 use super::{Holes, half_width};

@@ -2,7 +2,7 @@
 //! are dense, these areas are easier to find than what the lines cover. Twin of `shaders/lines/holes/holes.wgsl`.
 //!
 //! If each side of each face is a line, then a face is free only in its [inset]: the part that is at least half a
-//! line's width from all three sides. Insets of different faces do not overlap. So the free area of a pixel is the
+//! line's width from all three sides. Insets of faces side by side do not overlap. So the free area of a pixel is the
 //! sum of the insets' areas in it, and no line has to be drawn.
 //!
 //! This fails in some pixels. They are marked, and get their coverage in one of two other ways.
@@ -11,8 +11,8 @@
 //!
 //! - a sample of the pixel shows nothing;
 //! - a visible part of a rim is within half a line's width. A rim is an edge at which the surface ends on screen or
-//!   turns away. The line of a rim also covers what lies behind the surface;
-//! - a face that counts in the pixel (see below) is partly hidden by a face that lies well in front of it.
+//!   turns away, or that has more than two faces. The line of a rim also covers what lies behind the surface;
+//! - a face that counts in the pixel or close to it (see below) is partly hidden by a face well in front of it.
 //!
 //! In the other marked pixels all edges are drawn one by one, as strokes (a stroke is the area within half a line's
 //! width of an edge):
@@ -20,14 +20,15 @@
 //! - a sample of the pixel shows the outline mesh, or a sample in or next to it shows a clipped
 //!   face (no insets are computed for these);
 //! - a [tip](tips) is close, which is a visible corner whose face no sample of its pixel shows;
-//! - a face that counts in the pixel is partly hidden by a face that it intersects nearby.
+//! - a face that counts in the pixel or close to it is partly hidden by the outline mesh, or by a face that may
+//!   intersect it nearby.
 //!
 //! With one sample per pixel, all marked pixels get strokes: a rim that no sample shows may
 //! count as hidden, and the strokes of the edges beside it make up for it.
 //!
-//! A face counts in a pixel if a sample of the pixel, or of one of the eight pixels around it, shows the face. No
-//! face is missed that way: each point of a visible inset is the centre of a disc that shows the face and is as wide
-//! as the line, and `LinePass::holes_width_px` admits only lines so wide that such a disc contains a sample.
+//! A face counts in a pixel if a sample of the pixel, or of one of the eight pixels around it, shows the face. A face
+//! that nothing hides is not missed: each point of its inset is the centre of a disc that shows the face and is as
+//! wide as the line, and `LinePass::holes_width_px` admits only lines so wide that such a disc contains a sample.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

@@ -1,10 +1,11 @@
-//! The search for tips, corners that are visible though no sample shows their face (stage lines).
-//! Twin of `shaders/lines/holes/tips.wgsl`.
+//! The search for tips, corners that are visible though no sample of their pixel shows their face
+//! (stage lines). Twin of `shaders/lines/holes/tips.wgsl`.
 //!
-//! A tip is a corner in front of everything that its pixel shows, of a face that no sample of the
-//! pixel shows. An example is a spike that stands half a pixel out of a wall. Its lines are
-//! visible, but [`holes`](super), which finds what lines leave free of faces, knows only the faces
-//! that samples show and misses it. So in the pixels around a tip all edges are drawn one by one.
+//! A tip is a corner in a pixel whose samples all show faces without this corner. It lies in front
+//! of these faces, and on screen inside one of them. An example is a spike that stands half a pixel
+//! out of a wall. Its lines are visible, but [`holes`](super), which finds what lines leave free of
+//! faces, knows only the faces that samples show and misses it. So in the pixels around a tip all
+//! edges are drawn one by one.
 
 use super::{Holes, MARKED, STROKED, looked_at};
 use crate::backend::cpu::context::RasterContext;

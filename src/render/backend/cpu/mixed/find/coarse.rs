@@ -1,9 +1,10 @@
-//! A quick test that finds pixels whose faces all look alike (stage mixed). Such a pixel need not be drawn a second
-//! time, and most pixels that show several faces pass the test.
+//! A quick test in the search for the pixels that are drawn a second time (stage mixed): it finds pixels whose faces
+//! all look alike, and like the closest ones on the left and above. The samples of such a pixel need no further
+//! comparison. Most pixels that show several faces pass the test.
 //!
 //! A face's [`Look`] says what decides its colour. This module remembers the looks of recent faces, rounded to bytes.
-//! A pixel passes if the bytes of its faces differ so little that the looks themselves are certainly alike. For the
-//! other pixels the caller compares the looks.
+//! A pixel passes if all its faces are remembered and their bytes differ so little that the looks themselves are
+//! certainly alike. For the other pixels the caller compares the looks.
 
 use super::look::{ALIKE, Look, kinds};
 use crate::backend::cpu::geometry::samples::NOTHING;

@@ -1,6 +1,6 @@
 //! The look of a face: the numbers that decide its colour, such as its material and its normals, as far as they are
 //! known without shading it (stage mixed). Where faces meet that look different, pixels are drawn a second time, from
-//! more points.
+//! more points, unless colours go on over a shared corner.
 //!
 //! Looks are only compared with each other. They consist of numbers that are equal on both back-ends to the bit.
 //! Shaded colours would not do, because their last bits may differ.

@@ -4,18 +4,18 @@
 //! Samples are compared in pairs: those of a pixel one after the other, and across each of its four sides the two
 //! samples closest to the side, one in each pixel. A pair is a break if its samples show different faces, or a face
 //! and nothing, whose colours do not go on from one to the other ([`Pairs::step`]). Breaks are slight or hard. A
-//! pixel is mixed if any of its pairs is a break. It is drawn from 256 points if one of its breaks
-//! is hard, and otherwise from 64.
+//! pixel is mixed if any of its pairs is a break.
 //!
 //! An edge may cut off a corner of a pixel and yet lie between none of these samples. It then lies between those of
 //! a neighbour. So a pixel is mixed, too, if one of the four pixels beside, above and below it has a hard break
 //! inside.
 //!
-//! Pixels that a thin triangle touches may be mixed even if no sample shows it ([`thin`]). Pixels in which a
-//! transparent layer is visible are not mixed: layers are composited sample by sample.
+//! A thin triangle in a pixel may be a break even if no sample shows it ([`thin`]). A mixed pixel is drawn from 256
+//! points if one of the breaks that make it mixed is hard, and otherwise from 64. Pixels in which a transparent layer
+//! is visible are not mixed: layers are composited sample by sample.
 //!
-//! Most pixels are passed over quickly: all their samples show one face ([`differing`]), or faces that look alike
-//! ([`coarse`]).
+//! With four samples per pixel, most pixels are passed over quickly: all their samples show one face ([`differing`]),
+//! or faces that look alike ([`coarse`]).
 
 mod coarse;
 mod differing;

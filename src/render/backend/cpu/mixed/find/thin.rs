@@ -2,8 +2,8 @@
 //! (stage mixed). Such pixels are marked as mixed: they are drawn a second time, from more points.
 //!
 //! A thin triangle is followed along its longer side. A pixel that it touches is marked if no
-//! sample shows the triangle, and a sample shows something behind it whose colour differs from the
-//! triangle's. Neighbours of these pixels are not marked.
+//! sample shows the triangle, and a sample shows something that is farther away than the triangle's
+//! nearest corner and differs from it in colour. Neighbours of these pixels are not marked.
 
 use super::breaks;
 use super::pairs::Pairs;

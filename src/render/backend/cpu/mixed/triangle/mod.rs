@@ -1,5 +1,5 @@
 //! The points of a mixed pixel that a triangle covers, and the triangle's depth at each (stage mixed). Mixed pixels
-//! are drawn a second time, from 64 or 256 points each, because faces of different colours meet there.
+//! are drawn a second time, from 64 or 256 points each, because faces of different colours meet in or near them.
 //!
 //! Points lie in the middle of squares of 1/256 px, so their positions are counted in 1/512 px. The rest is as in
 //! the stage visibility: exact signs with the top-left rule, depth from integer offsets.

@@ -1,5 +1,6 @@
-//! Texture lookups in AVX2 and F16C instructions (stage shade). One vector holds the texture coordinates of a point
-//! in two mip levels, or of two points; another holds the four components of a texel.
+//! Texture lookups in AVX2 and F16C instructions (stage shade). One vector holds the texture coordinates of a place
+//! in two mip levels, or of two places in the part of a texture that a pixel covers. Another holds the four
+//! components of a texel.
 //!
 //! The results have the same bits as those of [`trilinear_plainly`](super::trilinear_plainly) and
 //! [`mean_plainly`](super::mean_plainly), from which compilers make slower code, with branches and one component at

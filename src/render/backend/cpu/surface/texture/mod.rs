@@ -1,5 +1,6 @@
-//! Texture lookups at shaded points, filtered over the part of the texture that a pixel covers (stage shade). They
-//! are computed for `N` points side by side. Twin of `shaders/surface/texture.wgsl`.
+//! Texture lookups at shaded points, filtered over the part of the texture that a pixel covers unless the texture
+//! asks for the nearest texel (stage shade). They are computed for `N` points side by side. Twin of
+//! `shaders/surface/texture.wgsl`.
 //!
 //! Both back-ends compute the same bits. A different last bit could be plain to see: it may decide whether a
 //! cut-out texture leaves a point of a face visible, or which of two texels is the nearest.

@@ -1,12 +1,13 @@
 //! The sum of the areas that lines leave free in each pixel of a band, a range of pixel rows (stage
 //! lines). If all edges of a surface are lines, each of its faces is free only in its
 //! [inset](super::inset), the part that the lines along its sides leave free. So each face adds the
-//! area of its inset to the pixels that it touches. Where something hides a part of the face, or a
-//! [tip](super::tips) is close, the sum is not reliable: such pixels are marked here.
+//! area of its inset to the pixels in or beside which a sample shows the face. Where something
+//! hides a part of the face, or a [tip](super::tips) is close, the sum is not reliable: such pixels
+//! are marked here.
 //!
 //! The insets of eight faces are computed at once. Then each face is rasterized by itself, eight
-//! pixels of a row at a time. `add_holes_plainly` in `lines/plain.rs` does the same pixel by pixel.
-//! Tests compare the two.
+//! pixels at a time. `add_holes_plainly` in `lines/plain.rs` does the same pixel by pixel. Tests
+//! compare the two.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

@@ -1,7 +1,7 @@
 //! The areas that lines leave free on small faces, those at most 7 px wide and high (stage lines).
 //! The area of such a face's inset (the part that the lines along its sides leave free) is computed
-//! only in pixels that the inset touches, because it is certainly 0 elsewhere: four pixels of two
-//! rows at a time, or eight of one row.
+//! only in groups of pixels that may touch the inset, because it is certainly 0 elsewhere: four
+//! pixels of each of two rows at a time, or eight of one row.
 
 use super::Digger;
 use crate::backend::cpu::isa::LANES;

@@ -96,8 +96,8 @@ impl Insets {
         Self::new(&Corners::load(context, ids), half, half_width)
     }
 
-    /// The insets of faces of a picture half as large as `half`, 1/256 px, under lines half as wide
-    /// as `half_width`, 1/256 px.
+    /// The insets of faces under lines whose half width is `half_width`; `half` is half the picture's size. All in
+    /// 1/256 px.
     #[inline(always)]
     pub fn new(faces: &Corners, half: [i32; 2], half_width: f32) -> Self {
         let corners: [[[i32; LANES]; 2]; 3] = std::array::from_fn(|k| [faces.x[k], faces.y[k]]);

@@ -1,6 +1,7 @@
 //! The test of `differing` in AVX2 instructions, two pixels per vector: it finds the pixels of a row whose samples,
-//! or whose neighbours on the left and above, show different faces (stage mixed). Only these may have to be drawn a
-//! second time, from more points.
+//! together with the closest samples of the pixels on the left and above, show different faces (stage mixed). Only
+//! the samples of these pixels are compared by colour, to find the pixels that are drawn a second time from more
+//! points.
 
 use std::arch::x86_64::*;
 
