@@ -45,8 +45,8 @@ Examples:
   meshsnap render knot.obj -o knot.png --watch
   meshsnap render - -o - --set wire.color=#f00 < knot.obj > knot.png
 
-No file is read that is not named. Exit codes: 0 done, 1 the mesh or the request document is at
-fault, 2 the command line is, 3 meshsnap or the machine is.";
+Without --siblings, no file is read that is not named. Exit codes: 0 done, 1 the mesh or the
+request document is at fault, 2 the command line is, 3 meshsnap or the machine is.";
 
 /// Arguments of `render`.
 #[derive(Args)]

@@ -1,14 +1,14 @@
 //! The two back-ends that draw the picture of a [`DrawPlan`], which says in slices and numbers what to draw: [`cpu`],
 //! our own rasterizer, and [`gpu`], which uses wgpu. Both have the same stages in the same order:
-//! transform -> visibility -> occlusion -> peeling -> shade -> mixed pixels -> lines -> resolve.
+//! transform -> visibility -> occlusion -> peeling -> shade -> mixed -> lines -> resolve.
 //!
 //! - transform moves vertices to the screen, visibility finds the nearest triangle of each sample (both in
 //!   `geometry`). A sample is one of the 1 to 16 places in a pixel at which the picture is computed.
 //! - occlusion finds how much less light hollows get (screen-space ambient occlusion).
 //! - peeling finds the transparent layers at each sample, from front to back (depth peeling).
 //! - shade computes colours (in `surface`).
-//! - mixed pixels, such as those in which faces of different colours meet, are drawn once more from many points each,
-//!   if samples are adaptive.
+//! - mixed draws mixed pixels, such as those in which faces of different colours meet, once more from many points
+//!   each, if samples are adaptive.
 //! - lines draws edges over the colours.
 //! - resolve lays the colours over the background and makes bytes of them.
 //!

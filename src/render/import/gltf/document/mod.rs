@@ -127,8 +127,8 @@ const READ: &[&str] = &[
     "KHR_texture_transform",
 ];
 
-/// Extensions that are not read and do not change shapes or surfaces: lights (the request sets
-/// those) and metadata.
+/// Extensions that are not read and do not change the shapes or surfaces of the file's first state: lights (the
+/// request sets those), metadata, and ways to animate or exchange materials.
 const UNSEEN: &[&str] = &[
     "EXT_instance_features",
     "EXT_lights_ies",
