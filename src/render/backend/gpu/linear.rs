@@ -1,6 +1,7 @@
 //! Pictures in linear light, which the library offers: half floats instead of sRGB bytes. The GPU computes the
-//! colours of the pixels in all stages but the last (resolve). They are read back band by band (a band is a range
-//! of pixel rows), and the CPU lays them over the background.
+//! colours of the pixels in all stages but the last (resolve). They are read back as 32-bit floats, band by
+//! band (a band is a range of pixel rows). The CPU lays them over the background, except where lines have blended it
+//! in on the GPU, and rounds them to half floats.
 
 use half::f16;
 

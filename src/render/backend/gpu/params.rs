@@ -1,8 +1,9 @@
 //! The parameters of kernels in the layout in which shaders read them: `Frame`, the uniforms of a picture, and
 //! `Batch`, those of a dispatch, field for field as in shaders/common.wgsl.
 //!
-//! Also the tables that are made for the upload of a plan: textures, triangles' materials and edge masks, materials
-//! of the outline mesh, index arrays, lists of edges, colours of lines, and the points of each sample.
+//! Also the tables that are made for the upload of a plan: sizes and places of textures, triangles' materials and edge
+//! masks, colours and materials of the outline mesh, index arrays, lists of edges, colours of lines, and for each
+//! sample a mask of those of the pixel's 256 coverage points that count for it (stage lines).
 
 use std::sync::Arc;
 
