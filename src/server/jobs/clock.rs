@@ -18,7 +18,7 @@ pub fn run(registry: &Arc<JobRegistry>, replace: &dyn Fn()) {
             registry.end(&job, JobState::Failed(Arc::new(Failure::TimeUp { limit_ms })));
         }
         for (running, is_replaced) in late.workers {
-            let (mesh, strikes) = registry.quarantine.strike(&running.bundle);
+            let (mesh, strikes) = registry.quarantine.strike(&running.meshes);
             let (job, request_id, ms) = (running.job.id, &*running.job.request_id, running.since.elapsed().as_millis());
             tracing::error!(%job, request_id, ms, %mesh, strikes, is_replaced, "a worker does not end its job");
             if let Some(metrics) = &registry.settings.metrics {

@@ -42,8 +42,8 @@ impl JobRegistry {
                 if let Some(mut work) = job.take_work() {
                     let memory = JobMemory::new(share, self.settings.memory.job_max());
                     work.lender = Some(memory.clone());
-                    let (bundle, since) = (work.bundle.clone(), Instant::now());
-                    inner.running.insert(job.serial, Running { job: job.clone(), bundle, since });
+                    let (meshes, since) = (work.meshes(), Instant::now());
+                    inner.running.insert(job.serial, Running { job: job.clone(), meshes, since });
                     job.state.send_replace(JobState::Running);
                     // Its time begins now.
                     self.clock.notify_one();

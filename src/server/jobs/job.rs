@@ -92,6 +92,12 @@ impl Work {
     pub fn budget(&self, limits: &Limits) -> Budget {
         Budget::lent(limits, self.lender.clone())
     }
+
+    /// Its mesh, and the newer one of a comparison.
+    pub fn meshes(&self) -> Vec<Bundle> {
+        let newer = if let Task::Diff(comparing) = &self.task { Some(&comparing.newer.bundle) } else { None };
+        [&self.bundle].into_iter().chain(newer).cloned().collect()
+    }
 }
 
 /// A request for a picture, a check or a comparison, as it was sent.

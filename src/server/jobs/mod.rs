@@ -283,7 +283,10 @@ impl Jobs {
     }
 
     fn check_mesh(&self, work: &Work) -> Result<(), Refusal> {
-        self.registry.quarantine.holds(&work.bundle).map_or(Ok(()), |mesh| Err(Refusal::Quarantined { mesh }))
+        let meshes = work.meshes();
+        // Each by itself, then two that were compared.
+        let held = meshes.chunks(1).chain([&meshes[..]]).find_map(|meshes| self.registry.quarantine.holds(meshes));
+        held.map_or(Ok(()), |mesh| Err(Refusal::Quarantined { mesh }))
     }
 
     /// Most works that [`Jobs::accept_all`] may ever accept at once.

@@ -5,8 +5,8 @@
 //! number of stuck ones is more than twice that of workers in the settings. If its job ends after
 //! all, the worker ends itself, or goes on in the place of a stuck one that was not replaced.
 //!
-//! A mesh that has kept a worker busy in this way twice is refused from then on. Of a comparison, only the older mesh
-//! is counted. The last 1024 meshes that have done so at least once are remembered, until the server ends.
+//! A mesh that has kept a worker busy in this way twice is refused from then on. So is the comparison of two meshes, but
+//! not each of them. The last 1024 meshes and pairs that have done so at least once are remembered, until the server ends.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -26,8 +26,8 @@ const MESHES_MAX: usize = 1024;
 pub struct Running {
     /// The job.
     pub job: Arc<Job>,
-    /// Its mesh.
-    pub bundle: Bundle,
+    /// Its mesh, and the newer one of a comparison.
+    pub meshes: Vec<Bundle>,
     /// The moment at which the worker has begun it.
     pub since: Instant,
 }
@@ -76,7 +76,7 @@ impl Overdue {
     }
 }
 
-/// The meshes that keep workers busy.
+/// The meshes, and pairs of compared meshes, that keep workers busy.
 #[derive(Default)]
 pub struct Quarantine(Mutex<HashMap<Digest, Entry>>);
 
@@ -87,30 +87,31 @@ struct Entry {
 }
 
 impl Quarantine {
-    /// A worker is stuck with this mesh. Returns its digest, and how often that has happened.
-    pub fn strike(&self, bundle: &Bundle) -> (Digest, u32) {
-        let (digest, bytes, last) = (digest(bundle), bundle.bytes_len(), Instant::now());
-        let mut meshes = self.lock();
-        if meshes.len() >= MESHES_MAX
-            && !meshes.contains_key(&digest)
-            && let Some(oldest) = meshes.iter().min_by_key(|(_, entry)| entry.last).map(|(digest, _)| *digest)
+    /// A worker is stuck with this mesh, or with two that it compares. Which of two is to blame is not known, so they
+    /// count as a pair and not each by itself. Returns the digest, and how often that has happened.
+    pub fn strike(&self, meshes: &[Bundle]) -> (Digest, u32) {
+        let (digest, bytes, last) = (digest(meshes), bytes_of(meshes), Instant::now());
+        let mut entries = self.lock();
+        if entries.len() >= MESHES_MAX
+            && !entries.contains_key(&digest)
+            && let Some(oldest) = entries.iter().min_by_key(|(_, entry)| entry.last).map(|(digest, _)| *digest)
         {
-            meshes.remove(&oldest);
+            entries.remove(&oldest);
         }
-        let entry = meshes.entry(digest).or_insert(Entry { strikes: 0, bytes, last });
+        let entry = entries.entry(digest).or_insert(Entry { strikes: 0, bytes, last });
         entry.strikes += 1;
         entry.last = last;
         (digest, entry.strikes)
     }
 
-    /// The digest of a mesh that is refused.
-    pub fn holds(&self, bundle: &Bundle) -> Option<Digest> {
-        let bytes = bundle.bytes_len();
+    /// The digest of a mesh, or of two that are compared, if that is refused.
+    pub fn holds(&self, meshes: &[Bundle]) -> Option<Digest> {
+        let bytes = bytes_of(meshes);
         // Hashing takes a while, and hardly ever is there anything to compare with.
         if !self.lock().values().any(|entry| entry.bytes == bytes && entry.strikes >= STRIKES) {
             return None;
         }
-        let digest = digest(bundle);
+        let digest = digest(meshes);
         self.lock().get(&digest).is_some_and(|entry| entry.strikes >= STRIKES).then_some(digest)
     }
 
@@ -124,11 +125,19 @@ impl Quarantine {
     }
 }
 
-/// The name of a mesh, as the store of meshes has it.
-fn digest(bundle: &Bundle) -> Digest {
-    match bundle.files() {
+fn bytes_of(meshes: &[Bundle]) -> u64 {
+    meshes.iter().map(Bundle::bytes_len).sum()
+}
+
+/// The name of a mesh, as the store of meshes has it. Of two, the digest of both names.
+fn digest(meshes: &[Bundle]) -> Digest {
+    let name = |bundle: &Bundle| match bundle.files() {
         [one] => Digest::of(&one.bytes),
         files => Digest::of_files(files),
+    };
+    match meshes {
+        [one] => name(one),
+        several => Digest::of(&several.iter().flat_map(|bundle| *name(bundle).as_bytes()).collect::<Vec<_>>()),
     }
 }
 
@@ -139,12 +148,25 @@ mod tests {
     #[test]
     fn strikes_of_a_mesh_add_up_where_all_places_are_taken() {
         let quarantine = Quarantine::default();
-        let mesh = |i: usize| Bundle::of_one(i.to_string().into_bytes());
+        let mesh = |i: usize| [Bundle::of_one(i.to_string().into_bytes())];
         for i in 0..MESHES_MAX {
             assert_eq!(quarantine.strike(&mesh(i)).1, 1);
         }
         assert_eq!(quarantine.strike(&mesh(0)).1, 2, "the oldest one");
         assert_eq!(quarantine.strike(&mesh(MESHES_MAX)).1, 1, "a new one, which takes the place of another");
         assert_eq!(quarantine.strike(&mesh(0)).1, 3);
+    }
+
+    #[test]
+    fn two_compared_meshes_count_as_a_pair() {
+        let quarantine = Quarantine::default();
+        let [good, evil] = [b"good", b"evil"].map(|bytes| Bundle::of_one(bytes.to_vec()));
+        let pair = [good.clone(), evil.clone()];
+        for strikes in 1..=2 {
+            assert_eq!(quarantine.strike(&pair).1, strikes);
+        }
+        assert!(quarantine.holds(&pair).is_some());
+        assert_eq!([[good.clone()], [evil.clone()]].map(|mesh| quarantine.holds(&mesh)), [None, None]);
+        assert_eq!(quarantine.holds(&[evil, good]), None, "the other way round");
     }
 }

@@ -1,6 +1,7 @@
 //! Tests of workers that do not end their jobs when the time is up.
 
 use super::*;
+use crate::jobs::job::{Comparing, Newer};
 
 const TIME: Duration = Duration::from_millis(20);
 
@@ -45,6 +46,31 @@ fn an_overdue_worker_is_replaced_and_its_mesh_refused_after_the_second() {
         std::thread::sleep(Duration::from_millis(1));
     }
     assert!(matches!(wait(&fixture.submit(b"12", false).unwrap()), JobState::Done(_)));
+}
+
+#[test]
+fn of_two_compared_meshes_the_comparison_is_refused_and_not_each() {
+    let fixture = fixture(JobSettings { job_time: TIME, overdue_grace: TIME, ..settings() });
+    let budget = &fixture.budget;
+    let comparison = |newer: &'static [u8]| {
+        let memory = Arc::new(budget.share(Account::Uploads));
+        let newer = Newer { bundle: Bundle::of_one(Bytes::from_static(newer)), memory, holds: [].into(), mesh: None };
+        let comparing = Comparing { newer, max_distance: None, picture: None, may_fail: false };
+        Work { task: Task::Diff(Box::new(comparing)), ..work(budget, b"stuck1") }
+    };
+    for overdue in 1..=2 {
+        wait(&fixture.jobs.submit(comparison(b"evil"), false).unwrap());
+        wait_for(&fixture.jobs, |load| load.overdue == overdue && load.running == 0);
+    }
+    let refusal = fixture.jobs.submit(comparison(b"evil"), false).unwrap_err();
+    assert!(matches!(refusal, Refusal::Quarantined { .. }), "{refusal:?}");
+    assert!(fixture.jobs.check_mesh(&comparison(b"good")).is_ok());
+    for mesh in [b"stuck1".as_slice(), b"evil"] {
+        assert!(fixture.jobs.check_mesh(&work(budget, mesh)).is_ok());
+    }
+    for _ in 0..2 {
+        fixture.open.send(()).unwrap();
+    }
 }
 
 #[test]
