@@ -9,7 +9,7 @@ mod target;
 #[cfg(test)]
 mod tests;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -86,7 +86,7 @@ struct Inner {
 #[derive(Default)]
 struct State {
     /// Ended jobs whose messages are not written yet.
-    incoming: Vec<Make>,
+    incoming: VecDeque<Make>,
     /// Deliveries that wait, by the time of their next attempt, each with the number of attempts so far.
     waiting: BTreeMap<(Instant, u64), (Delivery, u32)>,
     /// Deliveries on their way, by host.
@@ -139,7 +139,7 @@ impl Webhooks {
 
     /// Sends what `make` makes. It returns at once.
     pub fn send(&self, make: Make) {
-        self.0.lock().incoming.push(make);
+        self.0.lock().incoming.push_back(make);
         self.0.changed.notify_one();
     }
 
@@ -179,7 +179,7 @@ impl Inner {
     fn next(&self) -> Next {
         let mut state = self.lock();
         loop {
-            if let Some(make) = state.incoming.pop() {
+            if let Some(make) = state.incoming.pop_front() {
                 return Next::Make(make);
             }
             let now = Instant::now();
