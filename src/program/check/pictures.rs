@@ -52,8 +52,8 @@ pub struct ViewPictures {
 pub struct Changed {
     /// The picture of before.
     pub before: Vec<u8>,
-    /// The differences in colour.
-    pub difference: Vec<u8>,
+    /// The differences in colour, if the picture of before can be read and is of the same size.
+    pub difference: Option<Vec<u8>>,
     /// The mean difference that a person sees (FLIP).
     pub flip: f64,
 }
@@ -145,13 +145,13 @@ impl Pictures {
         Ok(all)
     }
 
-    /// The difference from an accepted picture. One that cannot be read has no difference that could be drawn.
+    /// The difference from an accepted picture.
     fn changed(&self, before: Vec<u8>, after: &[u8]) -> Result<Changed, CliError> {
         let read = |bytes: &[u8]| Picture::read(bytes, sniff(bytes)?, &self.limits).ok();
         let pair = read(&before).zip(read(after));
         let seen = pair.as_ref().and_then(|(a, b)| flip(a, b));
         let heat = pair.and_then(|(a, b)| flip_heat(&a, &b));
-        let difference = heat.map(|heat| png(&heat)).transpose()?.unwrap_or_default();
+        let difference = heat.map(|heat| png(&heat)).transpose()?;
         Ok(Changed { before, difference, flip: seen.map_or(1.0, |seen| seen.mean) })
     }
 
@@ -170,7 +170,9 @@ impl Pictures {
             };
             if let Some(Changed { before, difference, .. }) = changed {
                 write(&format!("{view}.before"), before)?;
-                write(&format!("{view}.difference"), difference)?;
+                if let Some(difference) = difference {
+                    write(&format!("{view}.difference"), difference)?;
+                }
             }
             names.push((*view, write(view, after)?));
         }

@@ -1,6 +1,6 @@
 //! `meshsnap check --since REF`: leaves out the meshes that have not changed since a git commit, and reads files as
 //! they were in that commit, both by the program `git`. A mesh also counts as changed if a file that it names, such
-//! as a texture, is new or has changed in its folder or below.
+//! as a texture, is new, has changed or is gone in its folder or below.
 
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
@@ -104,14 +104,19 @@ impl Commit {
         })
     }
 
-    /// The files that differ from those of the commit, and those that git does not know, as absolute paths.
+    /// The files that differ from those of the commit, those that are gone, and those that git does not know, as absolute
+    /// paths.
     fn changed(&self) -> Result<BTreeSet<PathBuf>, CliError> {
         let list = |words: &[&str]| self.git(words).map_err(|error| error.sentence("the changes cannot be listed"));
-        let differ = ["diff", "--name-only", "-z", "--no-ext-diff", "--no-renames", "--diff-filter=d", &self.id, "--"];
+        let differ = ["diff", "--name-only", "-z", "--no-ext-diff", "--no-renames", &self.id, "--"];
         let unknown = ["ls-files", "--others", "--exclude-standard", "-z"];
         let lists = [list(&differ)?, list(&unknown)?];
         let names = lists.iter().flat_map(|list| list.split(|byte| *byte == 0)).filter(|name| !name.is_empty());
-        Ok(names.filter_map(|name| fs::canonicalize(self.top.join(path_of(name))).ok()).collect())
+        // What is gone has a path without links in the repository.
+        let top = fs::canonicalize(&self.top).unwrap_or_else(|_| self.top.clone());
+        let absolute =
+            |name: &[u8]| fs::canonicalize(top.join(path_of(name))).unwrap_or_else(|_| top.join(path_of(name)));
+        Ok(names.map(absolute).collect())
     }
 
     /// A file as it is in the commit, of at most so many bytes. None if it is not there. The error says why it cannot be

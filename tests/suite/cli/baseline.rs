@@ -120,6 +120,24 @@ pub fn git(folder: &Path, words: &[&str]) {
 }
 
 #[test]
+fn an_accepted_picture_that_cannot_be_read_has_no_difference() {
+    let folder = folder();
+    let run = |more: &[&str]| {
+        let all = ["parts/good.obj", "--rules", "opens", "--baseline", "accepted", "--views", "iso"];
+        check(folder.path(), &[&all, more].concat())
+    };
+    assert_eq!(run(&["--update"]).0, Some(0));
+    fs::write(folder.path().join("accepted/parts/good.obj.iso.png"), "none").unwrap();
+    assert_eq!(run(&["--pictures", "out"]).0, Some(0));
+    let mut names: Vec<_> = fs::read_dir(folder.path().join("out")).unwrap().map(|file| file.unwrap()).collect();
+    names.sort_by_key(fs::DirEntry::file_name);
+    let sizes = names.iter().map(|file| (file.file_name().into_string().unwrap(), file.metadata().unwrap().len()));
+    let sizes: Vec<_> = sizes.collect();
+    assert!(sizes.iter().any(|(name, len)| name.ends_with(".iso.before.png") && *len == 4), "{sizes:?}");
+    assert!(sizes.iter().all(|(name, len)| !name.contains("difference") && *len > 0), "{sizes:?}");
+}
+
+#[test]
 fn only_meshes_that_changed_since_a_commit_are_checked() {
     let folder = folder();
     git(folder.path(), &["init", "-q"]);
@@ -148,6 +166,9 @@ fn only_meshes_that_changed_since_a_commit_are_checked() {
     // A material library of the meshes in its folder.
     fs::write(folder.path().join("colored.mtl"), b"newmtl a\nKd 0 1 0\n").unwrap();
     assert_eq!(names(folder.path(), "HEAD", &all), ["colored.obj"]);
+    fs::remove_file(folder.path().join("colored.mtl")).unwrap();
+    assert_eq!(names(folder.path(), "HEAD", &all[..2]), ["colored.obj"]);
+    fs::write(folder.path().join("colored.mtl"), b"newmtl a\nKd 0 1 0\n").unwrap();
     for (reference, part) in [("absent", "git knows no such commit"), ("--output=x", "git knows no such commit")] {
         let (code, out, said) = since(folder.path(), reference, &all);
         assert!(code == Some(2) && out.is_empty() && said.contains(part), "{reference}: {said}");

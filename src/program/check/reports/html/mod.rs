@@ -132,8 +132,8 @@ fn row(page: &mut String, verdict: &Verdict, pictures: &[ViewPictures], room: &m
 /// The pictures of a file, as far as there is room.
 fn views(page: &mut String, path: &str, pictures: &[ViewPictures], room: &mut usize) {
     let bytes = |one: &ViewPictures| {
-        let changed = one.changed.as_ref().map_or(0, |changed| changed.before.len() + changed.difference.len());
-        (one.after.len() + changed).div_ceil(3) * 4
+        let of_change = |changed: &Changed| changed.before.len() + changed.difference.as_ref().map_or(0, Vec::len);
+        (one.after.len() + one.changed.as_ref().map_or(0, of_change)).div_ceil(3) * 4
     };
     if pictures.is_empty() {
         return;
@@ -165,7 +165,7 @@ fn views(page: &mut String, path: &str, pictures: &[ViewPictures], room: &mut us
         };
         figure("before", before);
         figure("after", after);
-        if !difference.is_empty() {
+        if let Some(difference) = difference {
             figure("difference", difference);
         }
         let _ = write!(
