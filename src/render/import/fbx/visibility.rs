@@ -40,7 +40,8 @@ impl Visibilities {
                 _ => visibilities[i],
             };
             visibilities[i] = own;
-            if own == Visibility::Shown {
+            // Also of a hidden group: a level may not inherit visibility.
+            if own != Visibility::OtherDetailLevel {
                 for (level, child) in (&node.children).into_iter().enumerate() {
                     if let Some(visibility) =
                         visibilities.get_mut(child.element.typed_id as usize).filter(|_| !is_drawn(node, level))

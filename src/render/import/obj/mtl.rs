@@ -92,8 +92,10 @@ impl Material {
     }
 
     fn statement(&mut self, keyword: &[u8], rest: &[u8], passed: &mut SkippedLines) {
+        // As much of a keyword as tells it from others.
+        let keyword = &keyword[..keyword.len().min(12)];
         let mut lower = [0; 12];
-        let Some(lower) = lower.get_mut(..keyword.len()) else { return };
+        let lower = &mut lower[..keyword.len()];
         lower.copy_from_slice(keyword);
         lower.make_ascii_lowercase();
         let done = match &*lower {

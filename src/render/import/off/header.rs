@@ -129,7 +129,11 @@ mod tests {
         let other = parse(b"NCSTOFF\n3 1 0").unwrap();
         assert_eq!((other.before_color(), other.after_color(), other.numbers_min()), (3, 5, 11));
         assert_eq!(parse(b"OFF3 1 0").unwrap().body_at, 3);
-        assert_eq!(parse(b"OFF BINARY\nx").unwrap().body_at, 11);
+        for (text, body_at) in
+            [("OFF BINARY\nx", 11), ("OFF BINARY\r\nx", 12), ("OFF BINARY\rx", 11), ("OFF BINARY", 10)]
+        {
+            assert_eq!(parse(text.as_bytes()).unwrap().body_at, body_at, "{text:?}");
+        }
         assert_eq!(parse(b"4OFF 1").unwrap_err().fault, MeshFault::Unsupported);
         assert!(parse(b"nOFF 4 1").unwrap_err().detail.contains("nOFF"));
     }

@@ -45,7 +45,9 @@ impl<'a> Words<'a> {
     /// Offset of the next line.
     pub fn after_line(&self) -> usize {
         let rest = &self.bytes[self.at..];
-        self.at + rest.iter().position(|&b| b == b'\n').map_or(rest.len(), |end| end + 1)
+        let end = rest.iter().position(|&b| is_end(b)).unwrap_or(rest.len());
+        let marks = if rest[end..].starts_with(b"\r\n") { 2 } else { 1 };
+        self.at + (end + marks).min(rest.len())
     }
 }
 

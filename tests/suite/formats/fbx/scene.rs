@@ -39,7 +39,17 @@ fn hidden_parents_and_coarse_levels_are_not_drawn() {
         family("LodGroup", vec![], vec![], vec![attribute], vec![(400, 300, "")])
     };
     let hidden = || vec![flag("Visibility", 0.0)];
-    let cases: [Case; 4] = [
+    // A hidden group whose levels do not inherit that.
+    let apart = |id| model(id, "Mesh", vec![flag("Visibility Inheritance", 0.0)]);
+    let objects = vec![
+        geometry(100, &Solid::cuboid(), vec![]),
+        model(300, "LodGroup", hidden()),
+        apart(301),
+        apart(302),
+        level(),
+    ];
+    let links = [(300, 0, ""), (301, 300, ""), (302, 300, ""), (100, 301, ""), (100, 302, ""), (400, 300, "")];
+    let cases: [Case; 5] = [
         ("shown", family("Null", vec![], vec![], vec![], vec![]), 4, vec![]),
         ("hidden", family("Null", hidden(), vec![], vec![], vec![]), 1, vec!["hidden_ignored"]),
         (
@@ -49,6 +59,7 @@ fn hidden_parents_and_coarse_levels_are_not_drawn() {
             vec!["hidden_ignored"],
         ),
         ("levels", group(vec![]), 2, vec!["levels_ignored"]),
+        ("levels of a hidden group", file(1, objects, &links), 1, vec!["levels_ignored"]),
     ];
     for (name, nodes, shown, expected) in &cases {
         for (kind, bytes) in [("ascii", ascii(nodes)), ("binary", binary(nodes))] {
@@ -57,7 +68,7 @@ fn hidden_parents_and_coarse_levels_are_not_drawn() {
             assert_eq!(&codes(&mesh), expected, "{name} {kind}");
         }
     }
-    assert_eq!(cases.len(), 4);
+    assert_eq!(cases.len(), 5);
     let mesh = read(&ascii(&cases[3].1)).unwrap();
     assert!(
         mesh.report.warnings[0].detail.ends_with("(meshes of other levels in the file: 2)"),

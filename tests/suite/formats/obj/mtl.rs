@@ -93,6 +93,8 @@ fn textures_with_options() {
         slot("map_Kd a.png\nmap_d tex/n.png\nmap_Bump a.png\nbump a.png\nmap_Pr a.png\nmap_Ka a.png");
     assert_eq!(material.alpha, AlphaMode::Opaque);
     assert_eq!(codes(&mesh), ["bump_ignored", "maps_ignored", "map_d_ignored"]);
+    let (_, mesh) = slot("map_Kd a.png\nmap_roughness_or_the_like a.png");
+    assert_eq!(codes(&mesh), ["maps_ignored"], "a keyword longer than any that is read");
     // Other people's folders, and names that no file of the upload has.
     for name in ["C:\\Users\\me\\A.PNG", "/home/me/a.png", "../../a.png", "textures/a.png", "a%2Epng"] {
         let (_, mesh) = slot(&format!("map_Kd {name}"));
