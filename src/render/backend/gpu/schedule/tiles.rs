@@ -35,9 +35,8 @@ const FEWEST_TRIANGLES: u32 = 1 << 12;
 /// Workgroups for so few triangles, in numbers of those that share the large triangles.
 const SHARES_OF_FEW: u32 = 4;
 
-/// Tiles of a large triangle, at most: three wide and high, because it need not begin where a tile
-/// does.
-const LARGE_TILES_MAX: u64 = (HUGE_PX as u64 / TILE_PX as u64 + 1).pow(2);
+/// Tiles of a large triangle, at most. The first begins at the corner of its box.
+const LARGE_TILES_MAX: u64 = (HUGE_PX as u64 / TILE_PX as u64).pow(2);
 
 /// Loop iterations a thread of the tile kernel may run in a dispatch of known extent.
 ///
