@@ -51,7 +51,7 @@ pub struct Gauges {
     pub queues: Vec<(&'static str, usize, u64)>,
     /// Workers by state.
     pub workers: Vec<(&'static str, u64)>,
-    /// Meshes that are refused because workers did not end with them.
+    /// Meshes that are refused, by themselves or in comparisons, because workers did not end with them.
     pub quarantined: usize,
     /// Bytes in use and the cap, by account.
     pub memory: Vec<(&'static str, u64, u64)>,
@@ -116,7 +116,10 @@ impl Metrics {
             )?,
             quarantined: registered(
                 r,
-                IntGauge::new("meshsnap_quarantined_meshes", "Meshes that are refused because of that.")?,
+                IntGauge::new(
+                    "meshsnap_quarantined_meshes",
+                    "Meshes that are refused because of that, by themselves or in comparisons.",
+                )?,
             )?,
             resident: registered(r, IntGauge::new("process_resident_memory_bytes", "Resident memory size in bytes.")?)?,
             registry,

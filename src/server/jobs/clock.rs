@@ -1,5 +1,5 @@
 //! The thread that ends jobs whose time is up. If a worker still has not stopped after a grace, the
-//! thread logs that, counts it against the mesh (`watchdog.rs`), and starts another worker in its
+//! thread logs that, counts it against the meshes (`watchdog.rs`), and starts another worker in its
 //! place, unless too many are stuck.
 //!
 //! `JobRegistry::wait_for_late` decides what is late. It sleeps until something is, and drops expired results meanwhile.
@@ -18,9 +18,10 @@ pub fn run(registry: &Arc<JobRegistry>, replace: &dyn Fn()) {
             registry.end(&job, JobState::Failed(Arc::new(Failure::TimeUp { limit_ms })));
         }
         for (running, is_replaced) in late.workers {
-            let (mesh, strikes) = registry.quarantine.strike(&running.meshes);
             let (job, request_id, ms) = (running.job.id, &*running.job.request_id, running.since.elapsed().as_millis());
-            tracing::error!(%job, request_id, ms, %mesh, strikes, is_replaced, "a worker does not end its job");
+            for (mesh, strikes) in registry.quarantine.strike(&running.meshes) {
+                tracing::error!(%job, request_id, ms, %mesh, strikes, is_replaced, "a worker does not end its job");
+            }
             if let Some(metrics) = &registry.settings.metrics {
                 metrics.worker_overdue();
             }

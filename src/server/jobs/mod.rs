@@ -159,8 +159,8 @@ pub enum Refusal {
     Unstored(#[from] Unstored),
     /// The mesh keeps workers busy beyond the time of a job.
     #[error(
-        "the mesh {mesh} kept workers busy long after their time was up, so it is not tried again until the server starts \
-         anew"
+        "the mesh {mesh}, or comparisons with it, kept workers busy long after their time was up, so that is not tried \
+         again until the server starts anew"
     )]
     Quarantined {
         /// Its SHA-256.
@@ -197,7 +197,7 @@ pub struct JobLoad {
     pub overdue: usize,
     /// Those of them that have no replacement.
     pub missing: usize,
-    /// Meshes that are refused because of it.
+    /// Meshes that are refused because of it, by themselves or in comparisons.
     pub quarantined: usize,
     /// Time after which a job that somebody waits for would begin, as far as is known.
     pub wait: Duration,
@@ -283,10 +283,7 @@ impl Jobs {
     }
 
     fn check_mesh(&self, work: &Work) -> Result<(), Refusal> {
-        let meshes = work.meshes();
-        // Each by itself, then two that were compared.
-        let held = meshes.chunks(1).chain([&meshes[..]]).find_map(|meshes| self.registry.quarantine.holds(meshes));
-        held.map_or(Ok(()), |mesh| Err(Refusal::Quarantined { mesh }))
+        self.registry.quarantine.holds(&work.meshes()).map_or(Ok(()), |mesh| Err(Refusal::Quarantined { mesh }))
     }
 
     /// Most works that [`Jobs::accept_all`] may ever accept at once.

@@ -5,8 +5,9 @@
 //! number of stuck ones is more than twice that of workers in the settings. If its job ends after
 //! all, the worker ends itself, or goes on in the place of a stuck one that was not replaced.
 //!
-//! A mesh that has kept a worker busy in this way twice is refused from then on. So is the comparison of two meshes, but
-//! not each of them. The last 1024 meshes and pairs that have done so at least once are remembered, until the server ends.
+//! A mesh that has kept a worker busy in this way twice is refused from then on. Which mesh of a comparison is to
+//! blame is not known. So a mesh of two such comparisons is refused in comparisons alone. The last 1024 meshes that
+//! were in such a job are remembered, until the server ends.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -16,7 +17,7 @@ use super::job::Job;
 use crate::digest::Digest;
 use meshsnap_render::import::Bundle;
 
-/// Workers that a mesh may keep busy before it is refused.
+/// Workers that a mesh, or comparisons with it, may keep busy before that is refused.
 const STRIKES: u32 = 2;
 
 /// Most meshes that are remembered. One that is evil can be changed by a byte each time, so that no list is complete.
@@ -76,48 +77,70 @@ impl Overdue {
     }
 }
 
-/// The meshes, and pairs of compared meshes, that keep workers busy.
+/// The meshes that keep workers busy.
 #[derive(Default)]
 pub struct Quarantine(Mutex<HashMap<Digest, Entry>>);
 
+/// How often workers were stuck.
 struct Entry {
-    strikes: u32,
+    /// With the mesh by itself.
+    alone: u32,
+    /// With comparisons of it.
+    compared: u32,
     bytes: u64,
     last: Instant,
 }
 
+impl Entry {
+    fn is_refused(&self, is_compared: bool) -> bool {
+        self.alone >= STRIKES || is_compared && self.compared >= STRIKES
+    }
+}
+
 impl Quarantine {
-    /// A worker is stuck with this mesh, or with two that it compares. Which of two is to blame is not known, so they
-    /// count as a pair and not each by itself. Returns the digest, and how often that has happened.
-    pub fn strike(&self, meshes: &[Bundle]) -> (Digest, u32) {
-        let (digest, bytes, last) = (digest(meshes), bytes_of(meshes), Instant::now());
-        let mut entries = self.lock();
-        if entries.len() >= MESHES_MAX
-            && !entries.contains_key(&digest)
-            && let Some(oldest) = entries.iter().min_by_key(|(_, entry)| entry.last).map(|(digest, _)| *digest)
+    /// A worker is stuck with this mesh, or with the comparison of these. Returns their digests, each with how often that
+    /// has happened.
+    pub fn strike(&self, meshes: &[Bundle]) -> Vec<(Digest, u32)> {
+        let mut names: Vec<(Digest, u64)> = meshes.iter().map(|mesh| (digest(mesh), mesh.bytes_len())).collect();
+        // A mesh that is compared with itself is to blame.
+        names.dedup();
+        let is_compared = names.len() > 1;
+        names.into_iter().map(|(name, bytes)| (name, self.strike_one(name, bytes, is_compared))).collect()
+    }
+
+    fn strike_one(&self, name: Digest, bytes: u64, is_compared: bool) -> u32 {
+        let mut meshes = self.lock();
+        if meshes.len() >= MESHES_MAX
+            && !meshes.contains_key(&name)
+            && let Some(oldest) = meshes.iter().min_by_key(|(_, entry)| entry.last).map(|(name, _)| *name)
         {
-            entries.remove(&oldest);
+            meshes.remove(&oldest);
         }
-        let entry = entries.entry(digest).or_insert(Entry { strikes: 0, bytes, last });
-        entry.strikes += 1;
+        let last = Instant::now();
+        let entry = meshes.entry(name).or_insert(Entry { alone: 0, compared: 0, bytes, last });
         entry.last = last;
-        (digest, entry.strikes)
+        let strikes = if is_compared { &mut entry.compared } else { &mut entry.alone };
+        *strikes += 1;
+        *strikes
     }
 
-    /// The digest of a mesh, or of two that are compared, if that is refused.
+    /// The digest of a mesh of a job that is refused.
     pub fn holds(&self, meshes: &[Bundle]) -> Option<Digest> {
-        let bytes = bytes_of(meshes);
-        // Hashing takes a while, and hardly ever is there anything to compare with.
-        if !self.lock().values().any(|entry| entry.bytes == bytes && entry.strikes >= STRIKES) {
-            return None;
-        }
-        let digest = digest(meshes);
-        self.lock().get(&digest).is_some_and(|entry| entry.strikes >= STRIKES).then_some(digest)
+        let is_compared = meshes.len() > 1;
+        meshes.iter().find_map(|mesh| {
+            let bytes = mesh.bytes_len();
+            // Hashing takes a while, and hardly ever is there anything to compare with.
+            if !self.lock().values().any(|entry| entry.bytes == bytes && entry.is_refused(is_compared)) {
+                return None;
+            }
+            let name = digest(mesh);
+            self.lock().get(&name).is_some_and(|entry| entry.is_refused(is_compared)).then_some(name)
+        })
     }
 
-    /// Number of meshes that are refused.
+    /// Number of meshes that are refused, by themselves or in comparisons.
     pub fn count(&self) -> usize {
-        self.lock().values().filter(|entry| entry.strikes >= STRIKES).count()
+        self.lock().values().filter(|entry| entry.is_refused(true)).count()
     }
 
     fn lock(&self) -> MutexGuard<'_, HashMap<Digest, Entry>> {
@@ -125,19 +148,11 @@ impl Quarantine {
     }
 }
 
-fn bytes_of(meshes: &[Bundle]) -> u64 {
-    meshes.iter().map(Bundle::bytes_len).sum()
-}
-
-/// The name of a mesh, as the store of meshes has it. Of two, the digest of both names.
-fn digest(meshes: &[Bundle]) -> Digest {
-    let name = |bundle: &Bundle| match bundle.files() {
+/// The name of a mesh, as the store of meshes has it.
+fn digest(bundle: &Bundle) -> Digest {
+    match bundle.files() {
         [one] => Digest::of(&one.bytes),
         files => Digest::of_files(files),
-    };
-    match meshes {
-        [one] => name(one),
-        several => Digest::of(&several.iter().flat_map(|bundle| *name(bundle).as_bytes()).collect::<Vec<_>>()),
     }
 }
 
@@ -145,28 +160,36 @@ fn digest(meshes: &[Bundle]) -> Digest {
 mod tests {
     use super::*;
 
-    #[test]
-    fn strikes_of_a_mesh_add_up_where_all_places_are_taken() {
-        let quarantine = Quarantine::default();
-        let mesh = |i: usize| [Bundle::of_one(i.to_string().into_bytes())];
-        for i in 0..MESHES_MAX {
-            assert_eq!(quarantine.strike(&mesh(i)).1, 1);
-        }
-        assert_eq!(quarantine.strike(&mesh(0)).1, 2, "the oldest one");
-        assert_eq!(quarantine.strike(&mesh(MESHES_MAX)).1, 1, "a new one, which takes the place of another");
-        assert_eq!(quarantine.strike(&mesh(0)).1, 3);
+    fn mesh(name: &str) -> Bundle {
+        Bundle::of_one(name.as_bytes().to_vec())
     }
 
     #[test]
-    fn two_compared_meshes_count_as_a_pair() {
+    fn strikes_of_a_mesh_add_up_where_all_places_are_taken() {
         let quarantine = Quarantine::default();
-        let [good, evil] = [b"good", b"evil"].map(|bytes| Bundle::of_one(bytes.to_vec()));
-        let pair = [good.clone(), evil.clone()];
-        for strikes in 1..=2 {
-            assert_eq!(quarantine.strike(&pair).1, strikes);
+        let strike = |i: usize| quarantine.strike(&[mesh(&i.to_string())])[0].1;
+        for i in 0..MESHES_MAX {
+            assert_eq!(strike(i), 1);
         }
-        assert!(quarantine.holds(&pair).is_some());
-        assert_eq!([[good.clone()], [evil.clone()]].map(|mesh| quarantine.holds(&mesh)), [None, None]);
-        assert_eq!(quarantine.holds(&[evil, good]), None, "the other way round");
+        assert_eq!(strike(0), 2, "the oldest one");
+        assert_eq!(strike(MESHES_MAX), 1, "a new one, which takes the place of another");
+        assert_eq!(strike(0), 3);
+    }
+
+    #[test]
+    fn a_mesh_of_two_stuck_comparisons_is_refused_in_comparisons_alone() {
+        let quarantine = Quarantine::default();
+        let holds = |names: &[&str]| quarantine.holds(&names.iter().map(|name| mesh(name)).collect::<Vec<_>>());
+        let [evil, stuck] = ["evil", "stuck"].map(|name| Some(Digest::of(name.as_bytes())));
+        quarantine.strike(&[mesh("good"), mesh("evil")]);
+        assert_eq!(holds(&["good", "evil"]), None);
+        quarantine.strike(&[mesh("evil"), mesh("fine")]);
+        assert_eq!([holds(&["good", "evil"]), holds(&["evil", "new"])], [evil; 2]);
+        assert_eq!([holds(&["good", "fine"]), holds(&["evil"])], [None; 2]);
+        // One that is stuck by itself is refused everywhere; so is one that was compared with itself.
+        quarantine.strike(&[mesh("stuck")]);
+        quarantine.strike(&[mesh("stuck"), mesh("stuck")]);
+        assert_eq!([holds(&["stuck"]), holds(&["good", "stuck"])], [stuck; 2]);
+        assert_eq!(quarantine.count(), 2);
     }
 }

@@ -1,5 +1,5 @@
-//! `Idempotency-Key`: a request whose result is fetched later makes no second job when it is sent again, because its
-//! answer was lost. This file reads the header and computes the digest of the request (`diff.rs` that of a
+//! `Idempotency-Key`: a request whose result is fetched later may be sent again, if its answer was lost, and makes no
+//! second job. This file reads the header and computes the digest of the request (`diff.rs` that of a
 //! comparison); `jobs/claims.rs` keeps name and digest as long as the job can be found.
 
 use std::sync::Arc;

@@ -49,23 +49,24 @@ fn an_overdue_worker_is_replaced_and_its_mesh_refused_after_the_second() {
 }
 
 #[test]
-fn of_two_compared_meshes_the_comparison_is_refused_and_not_each() {
+fn comparisons_are_refused_where_two_with_the_same_mesh_were_stuck() {
     let fixture = fixture(JobSettings { job_time: TIME, overdue_grace: TIME, ..settings() });
     let budget = &fixture.budget;
     let comparison = |newer: &'static [u8]| {
         let memory = Arc::new(budget.share(Account::Uploads));
         let newer = Newer { bundle: Bundle::of_one(Bytes::from_static(newer)), memory, holds: [].into(), mesh: None };
         let comparing = Comparing { newer, max_distance: None, picture: None, may_fail: false };
-        Work { task: Task::Diff(Box::new(comparing)), ..work(budget, b"stuck1") }
+        Work { task: Task::Diff(Box::new(comparing)), ..work(budget, b"wait") }
     };
-    for overdue in 1..=2 {
-        wait(&fixture.jobs.submit(comparison(b"evil"), false).unwrap());
+    for (overdue, newer) in (1..).zip([b"one", b"two"]) {
+        let job = fixture.jobs.submit(comparison(newer), false).unwrap();
+        assert!(matches!(wait(&job), JobState::Failed(failure) if matches!(*failure, Failure::TimeUp { .. })));
         wait_for(&fixture.jobs, |load| load.overdue == overdue && load.running == 0);
     }
-    let refusal = fixture.jobs.submit(comparison(b"evil"), false).unwrap_err();
-    assert!(matches!(refusal, Refusal::Quarantined { .. }), "{refusal:?}");
-    assert!(fixture.jobs.check_mesh(&comparison(b"good")).is_ok());
-    for mesh in [b"stuck1".as_slice(), b"evil"] {
+    wait_for(&fixture.jobs, |load| load.quarantined == 1);
+    let refusal = fixture.jobs.submit(comparison(b"three"), false).unwrap_err();
+    assert!(matches!(refusal, Refusal::Quarantined { mesh } if mesh == Digest::of(b"wait")), "{refusal:?}");
+    for mesh in [b"wait", b"one "] {
         assert!(fixture.jobs.check_mesh(&work(budget, mesh)).is_ok());
     }
     for _ in 0..2 {
