@@ -25,7 +25,7 @@ const LIBRARY_BYTES_MAX: u64 = 16 << 20;
 const LARGE_FILE_BYTES_MAX: usize = 1024;
 
 /// Leaves out the meshes that have not changed since a commit, here or in git. A mesh counts as changed, too, where a
-/// file has whose name is in it, such as a texture in its folder or below, or in its material library.
+/// file has, or is gone, whose name is in it, such as a texture in its folder or below, or in its material library.
 pub fn keep_changed(tasks: &mut Tasks, reference: &str) -> Result<Commit, CliError> {
     let commit = Commit::find(reference)?;
     let changed = commit.changed()?;
@@ -112,11 +112,10 @@ impl Commit {
         let unknown = ["ls-files", "--others", "--exclude-standard", "-z"];
         let lists = [list(&differ)?, list(&unknown)?];
         let names = lists.iter().flat_map(|list| list.split(|byte| *byte == 0)).filter(|name| !name.is_empty());
-        // What is gone has a path without links in the repository.
+        // By the path where git has it, which may be gone or have become a link, and by that without links.
         let top = fs::canonicalize(&self.top).unwrap_or_else(|_| self.top.clone());
-        let absolute =
-            |name: &[u8]| fs::canonicalize(top.join(path_of(name))).unwrap_or_else(|_| top.join(path_of(name)));
-        Ok(names.map(absolute).collect())
+        let paths = names.map(|name| top.join(path_of(name)));
+        Ok(paths.flat_map(|path| fs::canonicalize(&path).into_iter().chain([path])).collect())
     }
 
     /// A file as it is in the commit, of at most so many bytes. None if it is not there. The error says why it cannot be

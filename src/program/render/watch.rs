@@ -1,6 +1,6 @@
-//! `render --watch`: draws again whenever a file has changed that the command names, that is in a
-//! folder it names, or that `--siblings` finds for a single picture. The pictures do not count, nor
-//! do hidden files in folders.
+//! `render --watch`: draws again whenever a file has changed: one that the command names, one in a folder that it
+//! names, or, for a single picture, one that `--siblings` finds. The pictures that it writes do not count, nor do
+//! hidden files in folders.
 //!
 //! A file counts as changed if its length or its time of modification is another, or if it comes or
 //! goes. The program looks at all files once a second, or less often if there are so many that
