@@ -32,15 +32,17 @@ impl Visibilities {
             }
             let above =
                 node.parent.as_ref().and_then(|parent| visibilities.get(parent.element.typed_id as usize)).copied();
-            let own = match above {
+            let own = match (above, visibilities[i]) {
+                // All of a level that is not drawn. Its group has said so of the top.
+                (Some(Visibility::OtherDetailLevel), _) | (_, Visibility::OtherDetailLevel) => {
+                    Visibility::OtherDetailLevel
+                }
                 _ if !node.visible => Visibility::Hidden,
-                Some(Visibility::Hidden) if inherits(node) => Visibility::Hidden,
-                Some(Visibility::OtherDetailLevel) => Visibility::OtherDetailLevel,
-                // Already set by its group.
-                _ => visibilities[i],
+                (Some(Visibility::Hidden), _) if inherits(node) => Visibility::Hidden,
+                _ => Visibility::Shown,
             };
             visibilities[i] = own;
-            // Also of a hidden group: a level may not inherit visibility.
+            // Also of a hidden group, because some levels do not inherit visibility.
             if own != Visibility::OtherDetailLevel {
                 for (level, child) in (&node.children).into_iter().enumerate() {
                     if let Some(visibility) =

@@ -8,6 +8,9 @@ use crate::import::MeshError;
 use crate::import::context::Context;
 use rapidhash::RapidHashMap;
 
+/// Letters of a keyword that are looked at: more than any keyword has that is read.
+const KEYWORD_MAX: usize = 12;
+
 /// The statements about one material. None: not stated.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Material {
@@ -92,9 +95,8 @@ impl Material {
     }
 
     fn statement(&mut self, keyword: &[u8], rest: &[u8], passed: &mut SkippedLines) {
-        // As much of a keyword as tells it from others.
-        let keyword = &keyword[..keyword.len().min(12)];
-        let mut lower = [0; 12];
+        let keyword = &keyword[..keyword.len().min(KEYWORD_MAX)];
+        let mut lower = [0; KEYWORD_MAX];
         let lower = &mut lower[..keyword.len()];
         lower.copy_from_slice(keyword);
         lower.make_ascii_lowercase();

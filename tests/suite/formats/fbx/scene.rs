@@ -49,7 +49,18 @@ fn hidden_parents_and_coarse_levels_are_not_drawn() {
         level(),
     ];
     let links = [(300, 0, ""), (301, 300, ""), (302, 300, ""), (100, 301, ""), (100, 302, ""), (400, 300, "")];
-    let cases: [Case; 5] = [
+    // A level that is hidden and not drawn, with a child that does not inherit that.
+    let below = [(300, 0, ""), (301, 300, ""), (302, 300, ""), (303, 302, ""), (400, 300, "")];
+    let below = [&below[..], &[301, 302, 303].map(|node| (100, node, ""))].concat();
+    let within = vec![
+        geometry(100, &Solid::cuboid(), vec![]),
+        level(),
+        model(300, "LodGroup", vec![]),
+        model(301, "Mesh", vec![]),
+        model(302, "Mesh", hidden()),
+        apart(303),
+    ];
+    let cases: [Case; 6] = [
         ("shown", family("Null", vec![], vec![], vec![], vec![]), 4, vec![]),
         ("hidden", family("Null", hidden(), vec![], vec![], vec![]), 1, vec!["hidden_ignored"]),
         (
@@ -60,6 +71,7 @@ fn hidden_parents_and_coarse_levels_are_not_drawn() {
         ),
         ("levels", group(vec![]), 2, vec!["levels_ignored"]),
         ("levels of a hidden group", file(1, objects, &links), 1, vec!["levels_ignored"]),
+        ("below a hidden level", file(1, within, &below), 1, vec!["levels_ignored"]),
     ];
     for (name, nodes, shown, expected) in &cases {
         for (kind, bytes) in [("ascii", ascii(nodes)), ("binary", binary(nodes))] {
@@ -68,7 +80,7 @@ fn hidden_parents_and_coarse_levels_are_not_drawn() {
             assert_eq!(&codes(&mesh), expected, "{name} {kind}");
         }
     }
-    assert_eq!(cases.len(), 5);
+    assert_eq!(cases.len(), 6);
     let mesh = read(&ascii(&cases[3].1)).unwrap();
     assert!(
         mesh.report.warnings[0].detail.ends_with("(meshes of other levels in the file: 2)"),

@@ -1,5 +1,5 @@
 //! The textures of glTF materials, with their samplers and images. Images stay encoded here. An
-//! image whose bytes are missing or broken is left out with a warning.
+//! image whose bytes cannot be found in the file or the upload is left out with a warning.
 
 use crate::import::bundle::show_all;
 use crate::import::context::Context;
