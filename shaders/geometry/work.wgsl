@@ -19,7 +19,7 @@ struct Work {
 
 @group(1) @binding(5) var<storage, read_write> work: Work;
 
-// Triangles of more pixels than this, in the picture, are shared out over all workgroups.
+// Triangles more than this many pixels wide or high, in the picture, are shared out over all workgroups.
 const HUGE_PX: i32 = 128;
 
 fn append_work_item(s: Setup, size: vec2<i32>, id: u32) {

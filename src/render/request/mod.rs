@@ -3,8 +3,9 @@
 //!
 //! Each of these overrides what precedes it: defaults, the style, the document, the dotted keys of a
 //! query or of `--set`. Materials begin from the document's own layers, as they are after all of these.
-//! `null` turns a layer or the sheet off. For any other key it is the same as leaving the key out of
-//! its object, unless the key's description says otherwise (`surface.color`: the file's colours).
+//! `null` turns a layer or the sheet off. For a key that may be empty, such as `camera.eye`, it is a value, which
+//! overrides what precedes it: nothing is given, or what the key's description says (`surface.color`: the file's
+//! colours). For any other key it is the same as leaving the key out of its object.
 //! [`table`] is the table of keys, from which [`schema()`] follows.
 
 mod apply;

@@ -1,5 +1,5 @@
 //! The words by which requests name the values of enumerations, such as `perspective` for
-//! `ProjectionKind::Perspective`: the trait [`Words`], and the macro by which the other files of `spec`
+//! `ProjectionKind::Perspective`: the trait [`Words`], and the macro by which other files
 //! define an enumeration with its words. The reader of requests, its error messages and the schema use
 //! these lists.
 

@@ -3,8 +3,8 @@
 //! then selected from a table of measured errors and times.
 //!
 //! A technique is a way to draw something: surfaces (whose error lies at the edges of their
-//! faces), wires along edges, or outlines around shapes. The expected error of a picture is the largest error of the techniques that it
-//! uses. It does not cover texture filtering, smooth normals between vertices, or the order and the
+//! faces), wires along edges, or outlines around shapes. The expected error of a picture is the
+//! largest error of the techniques that it uses. It does not cover texture filtering, smooth normals between vertices, or the order and the
 //! borders of layers. The expected time is the sum of the times of these techniques on the machine
 //! of the table, where the CPU draws with one thread. For other machines it is a hint.
 

@@ -1,6 +1,7 @@
-//! The table of keys: all that a request document may contain, except `style` and `mesh`. The reader,
-//! its error messages, the JSON Schema and the list of capabilities follow from it. A new key needs one
-//! entry of [`keys`], and the field of the spec that it sets.
+//! The table of keys: all that a request document may contain, except `style`, `mesh` and `$schema`. The
+//! reader, its error messages, the JSON Schema and the list of capabilities follow from it. A new key needs one
+//! entry of [`keys`], and the field of a draft that it sets. Most drafts hold structs of the spec as they are; where
+//! one does not, its `finish` sets the field of the spec.
 
 pub(crate) mod dependent;
 pub(crate) mod field;

@@ -1,5 +1,6 @@
 //! The sorting of triangles and edges into bands, before the stage visibility. A band is a range of pixel rows that
-//! one thread draws at a time. For each band, only the triangles and edges that touch it or its margin are looked at.
+//! one thread draws at a time. For each band, only the triangles that touch it or its margin, and the edges whose lines
+//! reach it, are looked at.
 //!
 //! Rims are the edges at which a surface ends on screen or turns away. If `lines/holes` draws most pixels of a pass
 //! of lines from faces alone (`DrawPlan::has_holes_under`), the rims are listed apart from the other edges, because

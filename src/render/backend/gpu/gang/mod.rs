@@ -5,8 +5,8 @@
 //! coordinate of a workgroup is the number of its job. What kernels write lies in the same buffers,
 //! one job's part after the other's; all parts have the same size. The data of the mesh is bound
 //! once. So the jobs of a gang draw the same mesh with the same materials by the same pipelines, and
-//! their pictures have equally many pixels. They may differ in the camera, the light and the background, and in width
-//! and height.
+//! their pictures have equally many pixels. They may differ in the camera, the light and the
+//! background, and in width and height.
 //!
 //! In reading order: [`seat`] (what a job brings to a gang, and which jobs can be in one gang),
 //! [`turns`] (which job draws, when, and for which others), [`mod@draw`] (the commands).

@@ -19,7 +19,7 @@ const BLIND_TESTS_MAX: u64 = 1 << 38;
 /// Pixels along a side of a tile, which a workgroup draws together.
 pub const TILE_PX: u32 = 64;
 
-/// Triangles of this many pixels, wide or high, are shared out over all workgroups.
+/// Triangles more than this many pixels wide or high, in the picture, are shared out over all workgroups.
 pub const HUGE_PX: u32 = 128;
 
 /// Fewer triangles than this in a dispatch leave most of a large GPU idle if each is drawn by one thread.
@@ -173,7 +173,7 @@ mod tests {
     fn rounds_cover_every_item_once() {
         let tiles = Tiles { in_rounds: true, workgroups: 32, tile_iterations: 384, band_tiles: 200, shares_few: false };
         let mut cases = 0;
-        for (large, huge) in [(0, 0), (1, 0), (0, 1), (351, 14), (352, 15), (353, 16), (100_000, 1000)] {
+        for (large, huge) in [(0, 0), (1, 0), (0, 1), (831, 14), (832, 15), (833, 16), (100_000, 1000)] {
             let mut next = [0, 0];
             for round in tiles.rounds(large, huge) {
                 for (range, next) in round.iter().zip(&mut next) {
