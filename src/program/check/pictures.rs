@@ -1,7 +1,7 @@
 //! Pictures for the reports and the baseline of `meshsnap check`: a mesh from each view that is asked
 //! for, and its topology from the first of them. Those of reports have marks where rules are broken.
-//! If a picture looked otherwise before, there are two more: the picture of before, and one of the
-//! difference. Before means the commit of `--since`, if the mesh can be read there, or else the
+//! Beside a picture that looked otherwise before there are the picture of before and one of the
+//! difference, if that can be drawn. Before means the commit of `--since`, if the mesh can be read there, or else the
 //! accepted picture in the baseline. With `--update`, nothing is compared.
 
 use std::fs;

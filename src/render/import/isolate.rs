@@ -55,7 +55,7 @@ pub fn isolate_in(isolation: Box<dyn Isolation>) {
     let _ = ISOLATION.set(isolation);
 }
 
-/// Where decoders in C and C++ run; None: in this process.
+/// The way to the processes in which decoders in C and C++ run. None: they run in this process.
 pub fn isolation() -> Option<&'static dyn Isolation> {
     ISOLATION.get().map(Box::as_ref)
 }

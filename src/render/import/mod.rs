@@ -89,7 +89,7 @@ impl From<Option<Format>> for Options {
     }
 }
 
-/// What the process does that decoders in C and C++ run in.
+/// The work of a process in which decoders in C and C++ run: the answer to one order.
 #[cfg(feature = "isolate")]
 pub fn answer_in_isolation(head: &[u8], file: &[u8]) -> Vec<u8> {
     match head.split_first() {

@@ -81,7 +81,7 @@ impl Overdue {
 #[derive(Default)]
 pub struct Quarantine(Mutex<HashMap<Digest, Entry>>);
 
-/// How often workers were stuck.
+/// The numbers of workers that were stuck with a mesh.
 struct Entry {
     /// With the mesh by itself.
     alone: u32,

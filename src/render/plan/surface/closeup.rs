@@ -2,8 +2,8 @@
 //! is not certain. Levels finer than this need not be kept.
 //!
 //! A pixel's footprint in a texture is an ellipse, and A the product of its axes: the texels that the pixel covers.
-//! Where the sampler looks at one place, as where the axes' ratio r is below 1.5, it takes the level of the longer
-//! step to a neighbouring pixel, which is at least log2(sqrt(A)). Elsewhere it looks at up to [`TAPS_MAX`] places
+//! The sampler looks at one place if, for example, the axes' ratio r is below 1.5. Then it takes the level of the longer
+//! step to a neighbouring pixel, which is at least log2(sqrt(A)). Otherwise it looks at up to [`TAPS_MAX`] places
 //! along the longer axis, in no finer level than that of the shorter one, log2(sqrt(A / r)), and that of an eighth of
 //! the longer one, log2(sqrt(A r) / 8). So no pixel reaches below log2(sqrt(A / min(r, 8))).
 //!

@@ -7,7 +7,7 @@
 //! strokes and composites them over the colours, under the light of [`line_light`]. Twins of most
 //! are in `shaders/lines/`.
 //!
-//! Where all edges of an opaque surface are drawn, most pixels need no strokes
+//! Most pixels need no strokes if all edges of an opaque surface are drawn
 //! ([`has_holes_under`](crate::plan::DrawPlan::has_holes_under) has all conditions): [`holes`]
 //! finds the parts of faces that lines leave free, and all else is covered. Mainly the pixels near
 //! rims, where the surface ends on screen, get strokes then.
