@@ -148,8 +148,10 @@ const FACES_FRONT: u32 = 1u;
 const FACES_BACK: u32 = 2u;
 
 // Bits of `line_flags`.
+// Only what nothing hides is drawn.
 const SHOWN_VISIBLE: u32 = 1u;
-const SHOWN_HIDDEN: u32 = 2u;
+// Hidden parts are drawn too, fainter. Without SHOWN_VISIBLE, the strokes are those of whole edges, for these parts.
+const FADES_HIDDEN: u32 = 2u;
 const SKIP_BACK: u32 = 4u;
 const CONTOUR: u32 = 8u;
 const LIT_PASS: u32 = 16u;
@@ -164,6 +166,8 @@ const RIM_PASS: u32 = 256u;
 const TINTED_PASS: u32 = 512u;
 // Edges name all of their faces.
 const NAMES_ALL_FACES: u32 = 1024u;
+// Edges between two faces with fringes are left out, unless they are silhouettes.
+const FRINGES: u32 = 2048u;
 
 const SURFACE: u32 = 1u;
 const HULL: u32 = 2u;

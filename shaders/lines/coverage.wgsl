@@ -3,14 +3,15 @@
 // an edge covers. The coverage is that of the union of all strokes in the pixel, or follows from the area that
 // lines leave free (holes/holes.wgsl). Twin of src/render/backend/cpu/lines/coverage.rs.
 //
-// Uses: common.wgsl (ADAPTIVE, FIRST_PASS, first_visibility_sample, has, HOLED, HOLES, HULL,
-// LIT_PASS, PEELING, recip, rn, rn3, rn4, rolled_off, sample_count, SURFACE, TINTED_PASS, Vertex,
-// wide_to_f32, WORKGROUP), one_job.wgsl (batch, frame), geometry/steepness.wgsl (NEARER_RATIO),
-// lines/holes/free_points.wgsl (add_points), lines/stroke_words.wgsl (AREA_UNIT, AREA_WORD,
-// CARRY_WORD, COUNT_WORD, HOLE_UNIT, HOLE_WORD, MARKED, MASK_WORD, MASK_WORDS, POINTS, SLACK_WORD,
-// STROKE_WORDS, STROKED), mixed/place.wgsl (border_at, FEW, number_at), over.wgsl (background_at,
-// flip_alpha_sign, is_composited, over_background), peeling/state.wgsl (ALPHA_MIN, PeelState),
-// peeling/tints.wgsl (tint_at, tint_depths_at, tint_steepness_at, TINTS).
+// Uses: common.wgsl (ADAPTIVE, FADES_HIDDEN, FIRST_PASS, first_visibility_sample, has, HOLED,
+// HOLES, HULL, LIT_PASS, PEELING, recip, rn, rn3, rn4, rolled_off, sample_count, SHOWN_VISIBLE,
+// SURFACE, TINTED_PASS, Vertex, wide_to_f32, WORKGROUP), one_job.wgsl (batch, frame),
+// geometry/steepness.wgsl (NEARER_RATIO), lines/holes/free_points.wgsl (add_points),
+// lines/stroke_words.wgsl (AREA_UNIT, AREA_WORD, CARRY_WORD, COUNT_WORD, HOLE_UNIT, HOLE_WORD,
+// MARKED, MASK_WORD, MASK_WORDS, POINTS, SLACK_WORD, STROKE_WORDS, STROKED, WHOLE_WORD),
+// mixed/place.wgsl (border_at, FEW, number_at), over.wgsl (background_at, flip_alpha_sign,
+// is_composited, over_background), peeling/state.wgsl (ALPHA_MIN, PeelState), peeling/tints.wgsl
+// (tint_at, tint_depths_at, tint_steepness_at, TINTS).
 
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
 @group(1) @binding(3) var<storage, read> vertices: array<Vertex>;
@@ -39,6 +40,9 @@
 // difference between a stroke and its points. Of more strokes in one pixel, some overlap.
 const STROKES_SIDE_BY_SIDE: f32 = 4.0;
 
+// Alpha of hidden parts beside that of visible ones, where hidden parts are faded.
+const FADE: f32 = 0.25;
+
 @compute @workgroup_size(WORKGROUP)
 fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let i = gid.x + gid.y * groups.x * WORKGROUP;
@@ -50,6 +54,10 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
         colors[i] = flip_alpha_sign(background_at(i));
     }
     let at = STROKE_WORDS * i;
+    if (batch.line_flags & (FADES_HIDDEN | SHOWN_VISIBLE)) == FADES_HIDDEN {
+        keep_whole_share(i);
+        return;
+    }
     var depth = 0.0;
     if (batch.line_flags & TINTED_PASS) != 0u {
         depth = bitcast<f32>(owners[batch.count + i]);
@@ -65,7 +73,8 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
     }
     let sum = area_sum(at);
     let all = point_sum(at);
-    if !by_holes && (sum.x | sum.y | all.x | all.y) == 0u {
+    let whole = bitcast<f32>(strokes[at + WHOLE_WORD]);
+    if !by_holes && (sum.x | sum.y | all.x | all.y) == 0u && whole == 0.0 {
         if has(HOLED) {
             strokes[at + HOLE_WORD] = 0u;
         }
@@ -80,7 +89,13 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
         points = covered_points(at);
         cover = covered_share(sum, all, points, slack_of(at));
     }
-    if cover > 0.0 {
+    // What hidden parts cover beside visible ones, which are fainter by a factor. Below 0 only by rounding.
+    var hidden = 0.0;
+    if (batch.line_flags & FADES_HIDDEN) != 0u {
+        hidden = rn(FADE * (whole - cover));
+    }
+    let all_lines = cover + hidden;
+    if all_lines > 0.0 {
         var color = line_colors[batch.line_pass];
         if batch.line_fade != 0u {
             color = rn4(color * fade_at(i));
@@ -94,14 +109,35 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
         if (batch.line_flags & LIT_PASS) != 0u {
             color = lit_color(color, colors[batch.count + i].xy);
         }
+        let hidden_color = color;
         if (batch.line_flags & TINTED_PASS) != 0u {
             color = tinted(i, depth, color);
         }
-        colors[i] = flip_alpha_sign(rn4(cover * color) + rn4(under * (1.0 - rn(cover * color.w))));
+        let lines = rn4(cover * color) + rn4(hidden * hidden_color);
+        colors[i] = flip_alpha_sign(lines + rn4(under * (1.0 - rn(all_lines * color.w))));
     }
-    // For the next pass.
+    clear_strokes(at);
+}
+
+// For the next pass.
+fn clear_strokes(at: u32) {
     for (var w = 0u; w < STROKE_WORDS; w++) {
         strokes[at + w] = 0u;
+    }
+}
+
+// Keeps the share of points that whole edges cover, for the strokes of their visible parts, which follow.
+// The light on them is that of the pixel's samples; any face will do where no stroke has named one.
+fn keep_whole_share(i: u32) {
+    let at = STROKE_WORDS * i;
+    let sum = area_sum(at);
+    let points = covered_points(at);
+    if (sum.x | sum.y | points) != 0u {
+        clear_strokes(at);
+        strokes[at + WHOLE_WORD] = bitcast<u32>(rn(f32(points) * (batch.line_peak * (1.0 / 256.0))));
+        if (batch.line_flags & LIT_PASS) != 0u {
+            owners[i] = max(owners[i], 1u);
+        }
     }
 }
 

@@ -1,5 +1,5 @@
-// Stage lines, per edge: draws the edge as a line of exact width. The kernel finds the visible (or hidden) parts of
-// the edge. To the pixels that a part touches (only to some, where holes/holes.wgsl finds the coverage) it adds a
+// Stage lines, per edge: draws the edge as a line of exact width. The kernel finds the visible parts of the edge,
+// unless whole edges are drawn. To the pixels that a part touches (only to some, where holes/holes.wgsl finds the coverage) it adds a
 // stroke: all that lies within half the line's width of the part. coverage.wgsl makes colours of the strokes. Twin of
 // src/render/backend/cpu/lines/edge.rs.
 //
@@ -12,9 +12,9 @@
 // There a workgroup pauses after a number of units of work, and the next dispatch continues where it has paused. A
 // unit is a look at shares (one by each thread), the search for what hides one, or the drawing of a part of it.
 //
-// Uses: common.wgsl (has, HOLED, HOLES, LIT_PASS, recip, RIM_PASS, rn, SHOWN_HIDDEN, SHOWN_VISIBLE,
+// Uses: common.wgsl (FRINGES, has, HOLED, HOLES, LIT_PASS, recip, RIM_PASS, rn, SHOWN_VISIBLE,
 // TINTED_PASS, Vertex), one_job.wgsl (batch, frame), lines/contour.wgsl (is_drawn, is_silhouette,
-// lighting_face), lines/hidden_lines.wgsl (begin_runs, BEYOND, count_found, has_too_many,
+// lighting_face), lines/fringed.wgsl (is_fringed), lines/hidden_lines.wgsl (begin_runs, BEYOND, count_found, has_too_many,
 // is_all_hidden, joined_run, look_around, shows_interval), lines/segment.wgsl (depth_of, point_at,
 // rows_of, Segment, segment_of, SLACK_PX), lines/stroke.wgsl (add_stroke, is_full, place_of,
 // reach_of_line, touches), lines/stroke_words.wgsl (HOLE_WORD, point_marks, STROKE_WORDS, STROKED).
@@ -43,10 +43,9 @@ struct Progress {
 struct Paused {
     // Its next share.
     share: u32,
-    // 1 if a part of that share is drawn: up to `begin`, where it is hidden from `hidden_from` on.
+    // 1 if a part of that share is drawn, up to `begin`.
     is_begun: u32,
     begin: f32,
-    hidden_from: f32,
 };
 
 // Threads of a workgroup: a share has few samples and pixels, and few threads hardly wait for each other.
@@ -85,15 +84,8 @@ var<workgroup> waiting_now: u32;
 // Units of work that are left to the workgroup, the same in all threads.
 var<private> units_left: u32;
 
-// `begin` and `hidden_from` of a share of which nothing is drawn yet.
-fn fresh() -> vec2<f32> {
-    return vec2(-1.0, BEYOND);
-}
-
-// The same of a share that is drawn.
-fn done() -> vec2<f32> {
-    return vec2(BEYOND, BEYOND);
-}
+// How far a share is drawn of which nothing is drawn yet.
+const FRESH: f32 = -1.0;
 
 @compute @workgroup_size(LINE_THREADS)
 fn edge(
@@ -157,7 +149,23 @@ fn shares_of(edge: vec4<u32>) -> u32 {
     if has(HOLED) && (batch.line_flags & (HOLES | RIM_PASS)) != 0u && is_silhouette(edge) != is_rim_pass() {
         return 0u;
     }
+    if is_in_fringes(edge) {
+        return 0u;
+    }
     return window_count(s) * batch.line_slices;
+}
+
+// True if the fringes of faces tell what the edge's line covers.
+fn is_in_fringes(edge: vec4<u32>) -> bool {
+    return has(HOLED) && (batch.line_flags & FRINGES) != 0u && !is_silhouette(edge)
+        && has_fringe(edge.z) && has_fringe(edge.w);
+}
+
+fn has_fringe(face: u32) -> bool {
+    let a = vertices[triangles[3u * face]];
+    let b = vertices[triangles[3u * face + 1u]];
+    let c = vertices[triangles[3u * face + 2u]];
+    return is_fringed(a, b, c);
 }
 
 // Draws the shares of the workgroup, from where it paused.
@@ -166,11 +174,11 @@ fn draw_shares(group: u32, thread: u32) {
     let may_pause = batch.line_units != NO_LIMIT;
     units_left = batch.line_units;
     var next = 0u;
-    var drawn_to = fresh();
+    var drawn_to = FRESH;
     if may_pause {
         let paused = progress.groups[group];
         next = paused.share;
-        drawn_to = select(fresh(), vec2(paused.begin, paused.hidden_from), paused.is_begun != 0u);
+        drawn_to = select(FRESH, paused.begin, paused.is_begun != 0u);
         // Before the first thread writes it again.
         storageBarrier();
     }
@@ -194,17 +202,17 @@ fn draw_shares(group: u32, thread: u32) {
                 break;
             }
             drawn_to = draw_share(group, share, drawn_to, thread);
-            if drawn_to.x < BEYOND {
+            if drawn_to < BEYOND {
                 next = share;
                 break;
             }
-            drawn_to = fresh();
+            drawn_to = FRESH;
             left &= left - 1u;
         }
     }
     draw_waiting(1u, thread);
     if may_pause && thread == 0u && all > 0u {
-        progress.groups[group] = Paused(next, select(0u, 1u, drawn_to.x >= 0.0), drawn_to.x, drawn_to.y);
+        progress.groups[group] = Paused(next, select(0u, 1u, drawn_to >= 0.0), drawn_to);
         if next < all {
             atomicAdd(&progress.left, 1u);
         }
@@ -235,25 +243,22 @@ fn is_due(group: u32, share: u32) -> bool {
     return window.first <= window.rows.y && gets_strokes(s, window);
 }
 
-// Draws a share, by all threads of the workgroup. Returns how far it is drawn.
+// Draws a share, by all threads of the workgroup. Returns how far it is drawn: BEYOND if it is done.
 //
 // One loop for all steps, because compilers copy what is called into each place that calls it, and
 // here that is most of the kernel.
-fn draw_share(group: u32, share: u32, drawn_to: vec2<f32>, thread: u32) -> vec2<f32> {
+fn draw_share(group: u32, share: u32, drawn_to: f32, thread: u32) -> f32 {
     let slot = edge_of_share(share);
     let edge = edge_of(group, slot);
     let s = segment_of(edge);
     let window = window_of(s, share - first_share_of(slot));
     let range = widened(s, window.range);
-    let shows_visible = (batch.line_flags & SHOWN_VISIBLE) != 0u;
-    let shows_hidden = (batch.line_flags & SHOWN_HIDDEN) != 0u;
     var step = DRAW_ALL;
-    if shows_visible || shows_hidden {
-        step = select(FIND_ALONG, select(DRAW_NOTHING, DRAW_ALL, shows_hidden), is_all_hidden(s, range, thread));
+    if (batch.line_flags & SHOWN_VISIBLE) != 0u {
+        step = select(FIND_ALONG, DRAW_NOTHING, is_all_hidden(s, range, thread));
     }
     units_left--;
-    var begin = max(range.x, drawn_to.x);
-    var hidden_from = drawn_to.y;
+    var begin = max(range.x, drawn_to);
     // Also ends where `begin` is no number.
     while step < DRAW_RUNS || (step == DRAW_RUNS && begin < range.y) {
         var interval = vec2(0.0);
@@ -264,7 +269,7 @@ fn draw_share(group: u32, share: u32, drawn_to: vec2<f32>, thread: u32) -> vec2<
         if step == FIND_ALONG {
             // Where an edge passes under another surface, a sliver of that may have its samples only
             // beside the edge.
-            step = select(select(DRAW_NOTHING, DRAW_ALL, shows_visible), FIND_AROUND, count_found(thread) > 0u);
+            step = select(DRAW_ALL, FIND_AROUND, count_found(thread) > 0u);
         } else if step == FIND_AROUND {
             count_found(thread);
             step = DRAW_RUNS;
@@ -273,36 +278,27 @@ fn draw_share(group: u32, share: u32, drawn_to: vec2<f32>, thread: u32) -> vec2<
             step = DRAW_NOTHING;
         } else {
             if units_left == 0u {
-                return vec2(begin, hidden_from);
+                return begin;
             }
             units_left--;
             run = joined_run(run, begin, thread);
             if run.x > begin {
                 // Hidden from here on, perhaps farther than this.
-                hidden_from = min(hidden_from, begin);
                 begin = run.x;
             } else {
                 let end = min(run.y, range.y);
                 let is_gap = begin > range.x && end < range.y;
-                if !shows_interval(edge, s, vec2(begin, end), is_gap) {
-                    hidden_from = min(hidden_from, begin);
-                } else if shows_visible {
+                if shows_interval(edge, s, vec2(begin, end), is_gap) {
                     interval = vec2(begin, end);
-                } else {
-                    interval = vec2(hidden_from, begin);
-                    hidden_from = BEYOND;
                 }
                 begin = end;
-            }
-            if !shows_visible && begin >= range.y && hidden_from < BEYOND {
-                interval = vec2(hidden_from, range.y);
             }
         }
         if interval.x < interval.y {
             draw_interval(edge, s, window, interval, thread);
         }
     }
-    return done();
+    return BEYOND;
 }
 
 // Steps of `draw_share`.
@@ -323,9 +319,9 @@ fn window_range(window: u32, count: u32) -> vec2<f32> {
     return vec2(rn(f32(window) * step), rn(f32(window + 1u) * step));
 }
 
-// The range as far as it touches the window's pixels; where nothing hides lines, all of the edge.
+// The range as far as it touches the window's pixels; where whole edges are drawn, all of the edge.
 fn widened(s: Segment, range: vec2<f32>) -> vec2<f32> {
-    if (batch.line_flags & (SHOWN_VISIBLE | SHOWN_HIDDEN)) == 0u {
+    if (batch.line_flags & SHOWN_VISIBLE) == 0u {
         return vec2(0.0, 1.0);
     }
     let beyond = rn((reach_of_line() + 1.0) * s.inverse_length);

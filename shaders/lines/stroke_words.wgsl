@@ -1,4 +1,4 @@
-// The layout of the buffer `strokes` (stage lines): 13 words per pixel about its strokes (a stroke is the area
+// The layout of the buffer `strokes` (stage lines): 14 words per pixel about its strokes (a stroke is the area
 // that the line of one part of an edge covers) and about the area that lines leave free. The kernels edge, holes,
 // tips and coverage write to them. At the end of a pass coverage.wgsl reads them and sets them to zero for the
 // next pass. The CPU has a struct, LineCoverage in src/render/backend/cpu/lines/coverage.rs, so this file has no
@@ -18,7 +18,7 @@ const AREA_UNIT: f32 = 65536.0;
 const HOLE_UNIT: f32 = 65536.0;
 
 // Words per pixel.
-const STROKE_WORDS: u32 = 13u;
+const STROKE_WORDS: u32 = 14u;
 // The sum of the strokes' areas.
 const AREA_WORD: u32 = 0u;
 // The sum of their counts of points.
@@ -32,6 +32,8 @@ const MASK_WORDS: u32 = 8u;
 const SLACK_WORD: u32 = 11u;
 // The area of holes, and the marks below. The CPU's are in Holes, src/render/backend/cpu/lines/holes/mod.rs.
 const HOLE_WORD: u32 = 12u;
+// The share that whole edges cover, where their hidden parts are faded: bits of an f32.
+const WHOLE_WORD: u32 = 13u;
 // Bit of a pixel in which areas do not tell what is free.
 const MARKED: u32 = 0x80000000u;
 // Bit of a marked pixel that gets the strokes of all edges, because points do not tell either.

@@ -11,7 +11,7 @@ use wgpu::naga;
 use super::cpu::geometry::transform::{GUARD, OUTSIDE, ScreenVertex};
 use super::cpu::geometry::{clip, samples, steepness};
 use super::cpu::lines::holes::{self, inset, tips};
-use super::cpu::lines::{coplanar, coverage, hidden_lines, profile, segment, stroke};
+use super::cpu::lines::{coplanar, coverage, fringes, hidden_lines, profile, segment, stroke};
 use super::cpu::mixed::find::breaks;
 use super::cpu::mixed::find::look::{self, kinds};
 use super::cpu::mixed::find::thin;
@@ -29,8 +29,8 @@ use super::gpu::schedule::sizes::{
 use super::gpu::schedule::{PIECES_MAX, WORKGROUP, line_shares, tiles};
 use super::sample_partition::{GENERATORS, POINTS};
 use crate::plan::{
-    ALPHA_MIN, Edge, LinePass, MIRROR_ROUGHNESS, OutermostSamples, ShadedMaterial, TAPS_PER_PIXEL, TEXTURE_NONE, TINTS,
-    Texture, debug_views, flags, pass_mask, sample_offsets, samplers, slots,
+    ALPHA_MIN, Edge, FADE, LinePass, MIRROR_ROUGHNESS, OutermostSamples, ShadedMaterial, TAPS_PER_PIXEL, TEXTURE_NONE,
+    TINTS, Texture, debug_views, flags, pass_mask, sample_offsets, samplers, slots,
 };
 
 /// Every constant that a shader and Rust both have, as the shader calls it.
@@ -52,8 +52,8 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
         EIGHT_SAMPLES SIXTEEN_SAMPLES FOUR_SAMPLES LIT_LINES CONTOURS HOLED PASS_MASKS OCCLUSION HULL_MATERIALS PEELING BEHIND_SURFACE
         WIRES_ONLY PEELED_HULL DERIVATIVE_NORMALS VERTEX_COLORS UVS TEXTURES WIRE_MINIMUM WIRE_LIT DEBUG VARYING ADAPTIVE);
     // Line flags, pass masks, faces.
-    add_same!("", line_flags: SHOWN_VISIBLE SHOWN_HIDDEN SKIP_BACK CONTOUR LIT_PASS FIRST_PASS INSIDE_OUT HOLES
-        RIM_PASS TINTED_PASS NAMES_ALL_FACES);
+    add_same!("", line_flags: SHOWN_VISIBLE FADES_HIDDEN SKIP_BACK CONTOUR LIT_PASS FIRST_PASS INSIDE_OUT HOLES
+        RIM_PASS TINTED_PASS NAMES_ALL_FACES FRINGES);
     add!(
         "PASS_LAYER" = pass_mask::LAYER,
         "PASS_FRONT_ONLY" = pass_mask::FRONT_ONLY,
@@ -91,7 +91,12 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
         "BOX_RADIUS" = std::f32::consts::FRAC_1_SQRT_2,
         "SLACK_PX" = segment::SLACK_PX
     );
-    add!("STROKES_SIDE_BY_SIDE" = coverage::STROKES_SIDE_BY_SIDE, "ALPHA_MIN" = ALPHA_MIN, "TINTS" = TINTS);
+    add!(
+        "STROKES_SIDE_BY_SIDE" = coverage::STROKES_SIDE_BY_SIDE,
+        "ALPHA_MIN" = ALPHA_MIN,
+        "TINTS" = TINTS,
+        "FADE" = FADE
+    );
     add!("EDGE_ON" = tints::EDGE_ON);
     add!("NEARER_RATIO" = steepness::NEARER_RATIO, "SNAP_ERROR" = hidden_lines::SNAP_ERROR);
     add!("INTERVAL_MIN_PX" = hidden_lines::INTERVAL_MIN_PX, "GAP_MIN_PX" = hidden_lines::GAP_MIN_PX);
@@ -101,7 +106,14 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("GAUSS_PLACE" = profile::GAUSS_PLACE, "GAUSS_OUTER" = profile::GAUSS_OUTER);
     add!("GAUSS_MIDDLE" = profile::GAUSS_MIDDLE);
     add!("MARKED" = holes::MARKED, "STROKED" = holes::STROKED, "CROSSING_PX" = holes::CROSSING_PX);
-    add!("TIP_SLACK" = tips::TIP_SLACK, "FACES_MAX" = holes::FACES_MAX, "HOLE_UNIT" = inset::HOLE_UNIT);
+    add!(
+        "TIP_SLACK" = tips::TIP_SLACK,
+        "FRINGE_UNIT" = fringes::FRINGE_UNIT,
+        "FACES_MAX" = holes::FACES_MAX,
+        "HOLE_UNIT" = inset::HOLE_UNIT
+    );
+    add!("FRINGE_FAR_PX" = fringes::FRINGE_FAR_PX, "FRINGE_SLACK" = fringes::FRINGE_SLACK);
+    add!("FRINGED_MAX" = fringes::FRINGED_MAX);
     add!("INSIDE" = inset::INSIDE, "NARROW_PX" = inset::NARROW_PX, "LEVEL_PX" = inset::LEVEL_PX);
     // Mixed pixels.
     add_same!("", kinds: BY_NORMAL BY_COLOR UNIQUE);

@@ -40,7 +40,7 @@ pub use framing::framing;
 pub use heat::Legend;
 pub use lines::{Edge, FaceSide, LineFade, LinePass, Shown};
 pub use outline::{HullPass, ScreenVertex};
-pub use peeling::{ALPHA_MIN, PeelingPass, TINTS, pass_mask};
+pub use peeling::{ALPHA_MIN, FADE, PeelingPass, TINTS, pass_mask};
 pub use prepared::{MeshToken, Prepared};
 pub use projection::{PX, Projection, Projector};
 pub use quality::{QualitySelection, SelectedSpec, select_quality};

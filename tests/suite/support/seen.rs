@@ -40,33 +40,33 @@ pub fn scene(plan: &DrawPlan<'_>) -> Scene {
     }
 }
 
-/// The visible segments of the plan's only line pass.
+/// The segments of the plan's only line pass that are drawn in full colour.
 pub fn segments(plan: &DrawPlan<'_>) -> Vec<Segment> {
     segments_of(plan, scene(plan))
 }
 
-/// The same of vertices on the lattice of 1/256 px on which triangles are drawn; all must be in
+/// The scene with its vertices on the lattice of 1/256 px on which triangles are drawn; all must be in
 /// front of the eye. Depth is affine on screen, so that what hides what stays the same but for what
 /// is seen nearly edge on.
-pub fn snapped_segments(plan: &DrawPlan<'_>) -> Vec<Segment> {
+pub fn snapped_scene(plan: &DrawPlan<'_>) -> Scene {
     let mut scene = scene(plan);
     for position in &mut scene.positions {
         let [x, y, depth] = project(scene.camera.homogeneous(*position));
         *position = [(x * 256.0).round() / 256.0, (y * 256.0).round() / 256.0, depth];
     }
     scene.camera = Camera::of_pixels(scene.camera.size_px);
-    segments_of(plan, scene)
+    scene
 }
 
-fn segments_of(plan: &DrawPlan<'_>, mut scene: Scene) -> Vec<Segment> {
+/// As [`segments`], of a scene of the plan's.
+pub fn segments_of(plan: &DrawPlan<'_>, mut scene: Scene) -> Vec<Segment> {
     let [pass] = &plan.lines[..] else { panic!("{} line passes", plan.lines.len()) };
     if pass.contour {
         scene.edges = visible::contour(&scene);
     }
     match pass.shown {
         Shown::All => visible::all(&scene),
-        Shown::Visible => visible::visible(&scene, &Screen::new(&scene)),
-        Shown::Hidden => panic!("the oracle draws no hidden lines"),
+        Shown::Visible | Shown::Faded => visible::visible(&scene, &Screen::new(&scene)),
     }
 }
 

@@ -6,13 +6,14 @@ use meshsnap_render::backend::cpu::CpuRenderer;
 use meshsnap_render::backend::gpu::GpuRenderer;
 use meshsnap_render::image::Image;
 use meshsnap_render::limits::Deadline;
-use meshsnap_render::plan::DrawPlan;
+use meshsnap_render::plan::{DrawPlan, FADE, Shown};
 
 use crate::oracle::lines::coverage::ink;
-use crate::oracle::surface::visible::Segment;
+use crate::oracle::screen::Scene;
+use crate::oracle::surface::visible::{Segment, all};
 use crate::support::gpus::gpus;
-use crate::support::seen::snapped_segments;
 pub use crate::support::seen::{scene, segments};
+use crate::support::seen::{segments_of, snapped_scene};
 
 /// True if the long cases run, which take minutes: `MESHSNAP_ORACLE=long`.
 pub fn is_long() -> bool {
@@ -43,17 +44,28 @@ pub fn points_per_side() -> u32 {
     cases(32, 64)
 }
 
-/// The coverage of each pixel by the plan's only line pass.
+/// The coverage of each pixel by the plan's only line pass. Hidden parts that fade count by their alpha beside that
+/// of the others.
 pub fn true_ink(plan: &DrawPlan<'_>) -> Vec<f64> {
-    ink_of(plan, &segments(plan))
+    ink_of(plan, scene(plan))
 }
 
 /// The same of vertices on the lattice of 1/256 px.
 pub fn snapped_ink(plan: &DrawPlan<'_>) -> Vec<f64> {
-    ink_of(plan, &snapped_segments(plan))
+    ink_of(plan, snapped_scene(plan))
 }
 
-fn ink_of(plan: &DrawPlan<'_>, segments: &[Segment]) -> Vec<f64> {
+fn ink_of(plan: &DrawPlan<'_>, scene: Scene) -> Vec<f64> {
+    let whole = (plan.lines[0].shown == Shown::Faded).then(|| ink_along(plan, &all(&scene)));
+    let drawn = ink_along(plan, &segments_of(plan, scene));
+    let fade = f64::from(FADE);
+    match whole {
+        Some(whole) => drawn.iter().zip(whole).map(|(drawn, whole)| drawn + fade * (whole - drawn)).collect(),
+        None => drawn,
+    }
+}
+
+fn ink_along(plan: &DrawPlan<'_>, segments: &[Segment]) -> Vec<f64> {
     ink([plan.width_px, plan.height_px], segments, f64::from(plan.lines[0].width_px), points_per_side())
 }
 

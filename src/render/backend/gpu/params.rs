@@ -136,8 +136,9 @@ pub mod line_flags {
 
     /// Only what nothing hides is drawn.
     pub const SHOWN_VISIBLE: u32 = 1;
-    /// Only what something hides is drawn.
-    pub const SHOWN_HIDDEN: u32 = 2;
+    /// Hidden parts are drawn too, fainter. Without [`SHOWN_VISIBLE`], the strokes are those of whole edges, for these
+    /// parts.
+    pub const FADES_HIDDEN: u32 = 2;
     /// Edges whose faces all face away are left out.
     pub const SKIP_BACK: u32 = 4;
     /// The pass draws silhouettes alone.
@@ -156,8 +157,10 @@ pub mod line_flags {
     pub const TINTED_PASS: u32 = 512;
     /// Edges name all of their faces.
     pub const NAMES_ALL_FACES: u32 = 1024;
+    /// Edges between two faces with fringes are left out, unless they are silhouettes.
+    pub const FRINGES: u32 = 2048;
 
-    /// The bits of a pass; [`FIRST_PASS`], [`HOLES`] and [`RIM_PASS`] aside.
+    /// The bits of a pass; [`FIRST_PASS`], [`HOLES`], [`RIM_PASS`] and [`FRINGES`] aside.
     pub fn of(plan: &DrawPlan<'_>, lines: &LinePass, something_hides: bool) -> u32 {
         let when = |condition: bool, flag: u32| if condition { flag } else { 0 };
         // Without a surface nothing hides a line, and there is no visibility buffer to read.
@@ -165,7 +168,7 @@ pub mod line_flags {
             Shown::All => 0,
             _ if !something_hides => 0,
             Shown::Visible => SHOWN_VISIBLE,
-            Shown::Hidden => SHOWN_HIDDEN,
+            Shown::Faded => SHOWN_VISIBLE | FADES_HIDDEN,
         };
         shown
             | when(lines.unseen_side.is_some(), SKIP_BACK)

@@ -56,12 +56,12 @@ pub fn passes(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<Lin
                 style.fade = AutoWidth::fade_of_features(scene, &edges, cx.deadline)?;
             }
             let is_chosen = style.contour && source.contours.is_some();
-            let mut drawn = style.passes(&edges, hides, unseen_side.filter(|_| !is_chosen));
-            drawn.iter_mut().for_each(|pass| pass.contour &= !is_chosen);
+            let mut pass = style.pass(&edges, hides, unseen_side.filter(|_| !is_chosen));
+            pass.contour &= !is_chosen;
             // Entries in the lists of up to four bands of the picture, a box of pixels, and whether it is a
             // silhouette.
-            cx.budget.spend("lists of edges", (drawn.len() * edges.len()) as u64, 16 + 8 + 1)?;
-            passes.extend(drawn);
+            cx.budget.spend("lists of edges", edges.len() as u64, 16 + 8 + 1)?;
+            passes.push(pass);
         }
     }
     Ok(passes)

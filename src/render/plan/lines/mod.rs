@@ -172,6 +172,12 @@ impl DrawPlan<'_> {
         something_hides && self.lines.iter().any(|lines| lines.shown != Shown::All)
     }
 
+    /// True if the parts of a pass's edges that a surface hides are drawn too, fainter.
+    pub fn fades_hidden(&self, lines: &LinePass) -> bool {
+        let something_hides = self.surface.is_some() || self.hull.is_some();
+        something_hides && lines.shown == Shown::Faded
+    }
+
     /// True if any pass may find the coverage of its lines by holes in faces.
     pub fn has_holes(&self) -> bool {
         self.lines.iter().any(|lines| self.has_holes_under(lines))
@@ -183,10 +189,20 @@ impl DrawPlan<'_> {
     pub fn has_holes_under(&self, lines: &LinePass) -> bool {
         let is_whole = |surface: &SurfacePass<'_>| surface.faces == Faces::Both;
         lines.is_complete
-            && lines.shown == Shown::Visible
+            && lines.shown != Shown::All
             && lines.smoothing_px == 0.0
             && LinePass::holes_width_px(self.samples).contains(&lines.width_px)
             && self.surface.as_ref().is_some_and(is_whole)
+    }
+
+    /// True if any pass finds what whole edges cover by fringes of faces.
+    pub fn has_fringes(&self) -> bool {
+        self.lines.iter().any(|lines| self.has_fringes_under(lines))
+    }
+
+    /// True if a pass finds what whole edges cover by fringes of faces: one that fades the hidden parts of all edges.
+    pub fn has_fringes_under(&self, lines: &LinePass) -> bool {
+        self.fades_hidden(lines) && self.has_holes_under(lines)
     }
 
     /// True if layers tint any line.
@@ -221,6 +237,7 @@ pub enum Shown {
     All,
     /// The parts that no surface hides.
     Visible,
-    /// The parts that a surface hides.
-    Hidden,
+    /// All of it, of which the parts that a surface hides are fainter ([`FADE`](crate::plan::FADE)) and lie below the
+    /// others.
+    Faded,
 }

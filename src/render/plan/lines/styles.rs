@@ -12,7 +12,6 @@ use crate::plan::context::PlanContext;
 use crate::plan::edges::edge_class::{Class, belongs_to, class_of};
 use crate::plan::lines::auto_width::{AutoWidth, OpenEdges, open_edges};
 use crate::plan::lines::fade::LineFade;
-use crate::plan::peeling::FADE;
 use crate::plan::{Edge, FaceSide, LinePass, PlanError, Shown};
 use crate::scene::{MaterialGroups, Scene};
 use crate::spec::color::Rgba;
@@ -106,29 +105,25 @@ impl LineStyle {
         Ok(())
     }
 
-    /// The passes that draw these edges, those of hidden parts first.
-    pub fn passes(&self, edges: &Arc<Vec<Edge>>, hides: bool, unseen_side: Option<FaceSide>) -> Vec<LinePass> {
-        let pass = |shown, color| LinePass {
+    /// The pass that draws these edges.
+    pub fn pass(&self, edges: &Arc<Vec<Edge>>, hides: bool, unseen_side: Option<FaceSide>) -> LinePass {
+        LinePass {
             edges: edges.clone(),
             is_complete: self.has_all_edges,
             keeps_short_parts: self.has_all_edges,
             width_px: self.width_px,
             smoothing_px: self.smoothing_px,
-            color,
+            color: self.color,
             fade: self.fade.clone(),
-            shown,
+            shown: match self.hidden {
+                Hidden::Hide if hides => Shown::Visible,
+                Hidden::Fade if hides => Shown::Faded,
+                _ => Shown::All,
+            },
             unseen_side: unseen_side.filter(|_| self.hidden == Hidden::Hide),
             contour: self.contour,
             lit: self.lit,
-            is_tinted: self.hidden != Hidden::Show && shown != Shown::Hidden,
-        };
-        match self.hidden {
-            Hidden::Show => vec![pass(Shown::All, self.color)],
-            _ if !hides => vec![pass(Shown::All, self.color)],
-            Hidden::Hide => vec![pass(Shown::Visible, self.color)],
-            Hidden::Fade => {
-                vec![pass(Shown::Hidden, self.color.map(|v| v * FADE)), pass(Shown::Visible, self.color)]
-            }
+            is_tinted: self.hidden != Hidden::Show,
         }
     }
 }

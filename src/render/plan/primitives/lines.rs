@@ -27,10 +27,10 @@ pub fn line_passes(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Ve
         let style = line_style(scene, layers, is_point).filter(LineStyle::is_seen);
         let Some(style) = style.filter(|_| !edges.is_empty()) else { continue };
         let count = edges.len() as u64;
-        let drawn = style.passes(&Arc::new(edges), scene.groups.hides_lines(), None);
+        let pass = style.pass(&Arc::new(edges), scene.groups.hides_lines(), None);
         // Entries in the lists of up to four bands of the picture.
-        cx.budget.spend("lists of lines and points", drawn.len() as u64 * count, 16)?;
-        passes.extend(drawn);
+        cx.budget.spend("lists of lines and points", count, 16)?;
+        passes.push(pass);
     }
     Ok(passes)
 }

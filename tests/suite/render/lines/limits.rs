@@ -136,7 +136,7 @@ fn lines_of<'a>(
     plan.projection.clip = clip;
     let edges: Vec<_> = edges.into_iter().map(|vertices| Edge { vertices, faces: [0, Edge::NO_FACE] }).collect();
     let pass = LinePass { color: [1.0, 0.0, 0.0, 1.0], ..LinePass::new(Arc::new(edges), 1.5) };
-    let passes = [Shown::Visible, Shown::Hidden, Shown::All].map(|shown| LinePass { shown, ..pass.clone() });
+    let passes = [Shown::Visible, Shown::Faded, Shown::All].map(|shown| LinePass { shown, ..pass.clone() });
     plan.lines = passes.to_vec();
     plan
 }

@@ -22,6 +22,8 @@ fn meshes() -> Vec<(&'static str, Mesh)> {
     all.map(|(name, obj)| (name, scenes::mesh(&obj))).collect()
 }
 
+const ALL: (&str, &str) = ("wire.edges", "triangles");
+
 const LOOKS: &[Keys<'_>] = &[
     &[("style", "wire"), ("size", "150x120")],
     &[("style", "wire"), ("size", "90"), ("samples", "1"), ("wire.thickness", "0.3"), ("view", "right")],
@@ -32,6 +34,20 @@ const LOOKS: &[Keys<'_>] = &[
     &[("style", "wire"), ("size", "90"), ("samples", "1"), ("wire.thickness", "1.6"), ("wire.lit", "true")],
     &[("style", "hidden-line"), ("size", "100"), ("samples", "8"), ("wire.thickness", "2.5")],
     &[("style", "wire"), ("size", "80x110"), ("samples", "16"), ("wire.thickness", "0.5"), ("view", "top")],
+    // Fringes at every number of samples; the last of them behind the eye, too.
+    &[("style", "wireframe"), ALL, ("size", "90"), ("samples", "1"), ("wire.thickness", "1.6"), ("wire.lit", "true")],
+    &[("style", "wireframe"), ALL, ("size", "140"), ("wire.thickness", "1")],
+    &[("style", "wireframe"), ALL, ("size", "100"), ("samples", "8"), ("wire.thickness", "7"), ("view", "right")],
+    &[
+        ("style", "wireframe"),
+        ALL,
+        ("size", "120x100"),
+        ("samples", "16"),
+        ("wire.thickness", "0.6"),
+        ("camera.eye", "0.2,0.35,0.3"),
+        ("camera.target", "-0.8,0,-0.9"),
+        ("camera.fov_deg", "80"),
+    ],
     // Behind the eye, and beyond the picture.
     &[
         ("style", "wire"),

@@ -306,7 +306,7 @@ fn lines_that_show_through_everything_take_no_tint() {
     };
     let glass = [("materials.left.surface.opacity", "0.4")];
     assert_eq!(passes(&glass, "hide"), [(Shown::Visible, true)]);
-    assert_eq!(passes(&glass, "fade"), [(Shown::Hidden, false), (Shown::Visible, true)]);
+    assert_eq!(passes(&glass, "fade"), [(Shown::Faded, true)]);
     assert_eq!(passes(&glass, "show"), [(Shown::All, false)]);
     assert_eq!(passes(&[], "hide"), [(Shown::Visible, false)]);
     // The ground's shadow is a layer, too, but lies below.

@@ -42,6 +42,8 @@ pub struct EdgeBin {
     rows: u32,
     /// Those that are rims; empty where the pass has no holes.
     pub rims: Bin,
+    /// Those of wide faces that are no rims; empty where the pass has no fringes.
+    pub wide: Bin,
     /// By edge of the chunk, true for a silhouette, drawn or not; empty where the pass has no holes.
     are_silhouettes: Vec<bool>,
     /// The others. Where the pass has holes, few bands need them: they are sorted when one does.
@@ -65,8 +67,8 @@ impl EdgeBin {
         (edges, triangles): (Range<usize>, &[TriangleBin]),
     ) -> Self {
         let bands = band_count(context.plan, rows);
-        let rims = Bin::new(bands, TALL_EDGE_BANDS);
-        let mut bin = Self { edges, rows, rims, are_silhouettes: Vec::new(), others: OnceLock::new() };
+        let [rims, wide] = [(); 2].map(|()| Bin::new(bands, TALL_EDGE_BANDS));
+        let mut bin = Self { edges, rows, rims, wide, are_silhouettes: Vec::new(), others: OnceLock::new() };
         if !context.plan.has_holes_under(pass) {
             bin.others(context, pass);
             return bin;
@@ -81,7 +83,28 @@ impl EdgeBin {
                 bin.rims.push(i, bands);
             }
         }
+        if context.plan.has_fringes_under(pass) {
+            bin.push_wide(context, pass, triangles);
+        }
         bin
+    }
+
+    /// Lists the edges of wide faces.
+    fn push_wide(&mut self, context: &RasterContext<'_>, pass: &LinePass, triangles: &[TriangleBin]) {
+        let is_wide = |face: u32| {
+            let chunk = triangles.get(face as usize / CHUNK);
+            let sides = chunk.and_then(|chunk| chunk.sides.get(face as usize % CHUNK / LANES));
+            sides.is_none_or(|sides| sides.wide >> (face as usize % LANES) & 1 != 0)
+        };
+        for (n, i) in self.edges.clone().enumerate() {
+            let edge = &pass.edges[i];
+            if !self.are_silhouettes[n]
+                && edge.faces.into_iter().any(is_wide)
+                && let Some((_, bands)) = placed(context, edge, pass.reach_px(), self.rows)
+            {
+                self.wide.push(i as u32, bands);
+            }
+        }
     }
 
     /// True if the band has no rim and, where the pass has no holes, no other edge.
@@ -136,7 +159,7 @@ impl OtherEdges {
 fn is_silhouette(context: &RasterContext<'_>, edge: &Edge, is_closed: bool, triangles: &[TriangleBin]) -> bool {
     let side = |face: u32| {
         let (chunk, face) = (triangles.get(face as usize / CHUNK)?, face as usize % CHUNK);
-        let Sides { front, back } = chunk.sides.get(face / LANES)?;
+        let Sides { front, back, .. } = chunk.sides.get(face / LANES)?;
         Some([front, back].map(|bits| bits >> (face % LANES) & 1))
     };
     let runs_along = |face: u32| {
@@ -199,14 +222,14 @@ fn passes(plan: &DrawPlan<'_>) -> (Vec<TrianglePass>, Vec<TrianglePass>) {
     let count = plan.triangles.len();
     // Layers are drawn from samples alone.
     let surface = |pass_bit| {
-        let has_mixed = plan.has_mixed() && pass_bit == pass_mask::SURFACE;
-        plan.surface.as_ref().map(|s| TrianglePass { ids: 0..count, pass_bit, faces: s.faces, has_mixed })
+        let has_points = (plan.has_mixed() || plan.has_fringes()) && pass_bit == pass_mask::SURFACE;
+        plan.surface.as_ref().map(|s| TrianglePass { ids: 0..count, pass_bit, faces: s.faces, has_points })
     };
     let around = |hull: &HullPass<'_>| TrianglePass {
         ids: count..count + hull.triangles.len(),
         pass_bit: 0,
         faces: Faces::Both,
-        has_mixed: plan.has_mixed() && !plan.has_peeled_hull(),
+        has_points: plan.has_mixed() && !plan.has_peeled_hull(),
     };
     let hull = plan.hull.as_ref().map(around);
     // Without pass masks nothing is peeled.

@@ -29,9 +29,10 @@ use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
 use crate::backend::cpu::geometry::tiles::Tiles;
 use crate::backend::cpu::geometry::visibility;
 use crate::backend::cpu::geometry::visibility::Setup;
-use crate::backend::cpu::lines::coverage::{BandStrokes, LineCompositor, composite};
-use crate::backend::cpu::lines::edge::{LineDrawer, LineTarget};
+use crate::backend::cpu::lines::coverage::{BandStrokes, Covered, LineCompositor, composite};
+use crate::backend::cpu::lines::edge::{Drawn, LineDrawer, LineTarget};
 use crate::backend::cpu::lines::farthest::Farthest;
+use crate::backend::cpu::lines::fringes::{add_fringes, add_fringes_plainly};
 use crate::backend::cpu::lines::holes::dig::add_holes;
 use crate::backend::cpu::lines::holes::free_points::{add_points, add_points_plainly};
 use crate::backend::cpu::lines::holes::{self, Holes};
@@ -46,7 +47,7 @@ use crate::backend::cpu::surface::flat::{draw_flat, shade_flat};
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::cpu::surface::together::shade_band;
 use crate::backend::{DrawStage, linear};
-use crate::plan::{LinePass, OcclusionPass};
+use crate::plan::{LinePass, OcclusionPass, Shown};
 
 /// Edges between two polls of the deadline. Wide lines count their pixels too.
 const EDGES_PER_POLL: usize = 256;
@@ -202,6 +203,31 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
         scratch.owners.resize(lit_pixels, 0);
         scratch.line_depths.clear();
         scratch.line_depths.resize(if plan.tints(pass) { pixels } else { 0 }, 0.0);
+        scratch.whole.clear();
+        scratch.holes.clear();
+        if plan.fades_hidden(pass) {
+            let target = &mut LineTarget {
+                strokes: &mut scratch.strokes,
+                owners: &mut scratch.owners,
+                depths: &mut [],
+                holes: &mut scratch.holes,
+            };
+            let seen = (&scratch.samples, &mut scratch.farthest);
+            draw_edges(context.isa, context, (pass, Drawn::Whole), edges, band, seen, target);
+            if plan.has_fringes_under(pass) {
+                let triangles = (&bins.triangles[..], band);
+                if context.is_plain() {
+                    add_fringes_plainly(context, pass, triangles, &scratch.samples, &mut scratch.strokes);
+                } else {
+                    add_fringes(context.isa, context, pass, triangles, &scratch.samples, &mut scratch.strokes);
+                }
+            }
+            scratch.strokes.take_shares(pass.peak(), &mut scratch.whole);
+            // The light is that of the samples; any face will do where no stroke has named one.
+            for (owner, _) in scratch.owners.iter_mut().zip(&scratch.whole).filter(|(_, share)| **share > 0.0) {
+                *owner = (*owner).max(1);
+            }
+        }
         find_holes(context, pass, (&bins.triangles, band), &scratch.samples, &mut scratch.holes);
         let target = &mut LineTarget {
             strokes: &mut scratch.strokes,
@@ -209,7 +235,8 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
             depths: &mut scratch.line_depths,
             holes: &mut scratch.holes,
         };
-        draw_edges(context.isa, context, pass, edges, band, (&scratch.samples, &mut scratch.farthest), target);
+        let parts = if pass.shown == Shown::All { Drawn::Whole } else { Drawn::Visible };
+        draw_edges(context.isa, context, (pass, parts), edges, band, (&scratch.samples, &mut scratch.farthest), target);
         find_points(context, pass, &scratch.samples, &scratch.holes, (&mut scratch.strokes, &mut scratch.owners));
         if lit_pixels > 0 {
             scratch.holes.own(&mut scratch.owners);
@@ -217,7 +244,7 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
         scratch.light.clear();
         scratch.light.resize(lit_pixels, Light::NONE);
         line_light::light_lines(context, &scratch.samples, &scratch.owners, &mut scratch.light);
-        let covered = (&scratch.strokes, &scratch.holes);
+        let covered = &Covered { strokes: &scratch.strokes, holes: &scratch.holes, whole: &scratch.whole };
         let seen = (&scratch.light[..], &scratch.line_depths[..]);
         composite(context.isa, &compositor, pass, covered, seen, &mut scratch.colors);
     }
@@ -300,7 +327,7 @@ dispatch! {
     /// The line stage of a band.
     pub fn draw_edges(
         context: &RasterContext<'_>,
-        pass: &LinePass,
+        pass: (&LinePass, Drawn),
         bins: &[EdgeBin],
         band: usize,
         seen: (&SampleBand, &mut Farthest),
@@ -405,20 +432,20 @@ fn draw_batches<'a, const S: usize>(
 #[inline(always)]
 fn edges_kernel(
     context: &RasterContext<'_>,
-    pass: &LinePass,
+    (pass, parts): (&LinePass, Drawn),
     bins: &[EdgeBin],
     band: usize,
     seen: (&SampleBand, &mut Farthest),
     target: &mut LineTarget<'_>,
 ) {
-    let mut drawer = LineDrawer::new(context, pass, seen);
+    let mut drawer = LineDrawer::new(context, (pass, parts), seen);
     let mut polls = 0;
     // An edge of a wide line is as much work as hundreds of others.
     let mut is_late = |drawer: &mut LineDrawer<'_>| {
         polls += 1;
         (polls % EDGES_PER_POLL == 1 || drawer.is_poll_due()) && context.deadline.check().is_err()
     };
-    drawer.marks = true;
+    drawer.marks = parts == Drawn::Visible;
     for edge in bins.iter().flat_map(|chunk| chunk.rims.items_in(band)) {
         if is_late(&mut drawer) {
             return;
@@ -426,6 +453,15 @@ fn edges_kernel(
         drawer.draw(&pass.edges[edge as usize], target);
     }
     drawer.marks = false;
+    if parts == Drawn::Whole && context.plan.has_fringes_under(pass) {
+        for edge in bins.iter().flat_map(|chunk| chunk.wide.items_in(band)) {
+            if is_late(&mut drawer) {
+                return;
+            }
+            drawer.draw(&pass.edges[edge as usize], target);
+        }
+        return;
+    }
     // Most bands with holes need no other edges.
     if !target.holes.collect_stroked() {
         return;

@@ -123,12 +123,13 @@ fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
     }
     let light = if plan.lights_lines() { size_of::<Light>() + size_of::<u32>() } else { 0 };
     let coverage = if plan.lines.is_empty() { 0 } else { BandStrokes::PIXEL_BYTES };
+    let whole = if plan.lines.iter().any(|lines| plan.fades_hidden(lines)) { size_of::<f32>() } else { 0 };
     let holes = if plan.has_holes() { Holes::row_bytes(plan.width_px) } else { 0 };
     let peel = if plan.peeling().is_some() { PeelBand::SAMPLE_BYTES } else { 0 };
     let tints = if plan.tints_lines() { Tints::PIXEL_BYTES + size_of::<f32>() } else { 0 };
     // A plan of flat faces alone needs no colours of pixels.
     let color = if plan.lines.is_empty() && FlatColors::suffice(plan) { 0 } else { size_of::<[f32; 4]>() };
-    plan.width_px as usize * (color + light + coverage + tints) + holes + samples(plan.width_px) * peel
+    plan.width_px as usize * (color + light + coverage + whole + tints) + holes + samples(plan.width_px) * peel
 }
 
 /// A band's buffers, kept from band to band.
@@ -149,6 +150,8 @@ pub struct BandScratch {
     pub colors: Vec<[f32; 4]>,
     /// Strokes of the current line pass.
     pub strokes: BandStrokes,
+    /// Per pixel, where the pass fades hidden parts of edges: the share that whole edges cover.
+    pub whole: Vec<f32>,
     /// Holes of the current line pass.
     pub holes: Holes,
     /// Mixed pixels.
@@ -172,6 +175,7 @@ impl BandScratch {
             farthest: Farthest::default(),
             colors: Vec::new(),
             strokes: BandStrokes::default(),
+            whole: Vec::new(),
             holes: Holes::default(),
             mixed: MixedScratch::default(),
             owners: Vec::new(),
@@ -197,6 +201,7 @@ impl BandScratch {
             + self.farthest.bytes()
             + self.colors.capacity() * size_of::<[f32; 4]>()
             + self.strokes.bytes()
+            + self.whole.capacity() * size_of::<f32>()
             + self.holes.bytes()
             + self.mixed.bytes()
             + self.owners.capacity() * size_of::<u32>()
@@ -340,7 +345,7 @@ mod tests {
                     surface.is_shaded = true;
                     plan.surface = Some(surface);
                     for lines in &mut plan.lines {
-                        (lines.width_px, lines.shown, lines.lit) = (width_px, Shown::Hidden, true);
+                        (lines.width_px, lines.shown, lines.lit) = (width_px, Shown::Faded, true);
                     }
                     if let Some(first) = plan.lines.first_mut() {
                         (first.shown, first.is_complete) = (Shown::Visible, true);

@@ -21,7 +21,7 @@ use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::resolve::{is_composited, over_background};
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::sample_partition::sample_partition;
-use crate::plan::{ALPHA_MIN, DrawPlan, LinePass};
+use crate::plan::{ALPHA_MIN, DrawPlan, FADE, LinePass};
 
 /// The mask of a pixel without strokes.
 const NO_POINTS: Mask = [0; WORDS];
@@ -120,6 +120,26 @@ impl BandStrokes {
         self.coverage.get((self.places[pixel] as usize).wrapping_sub(1))
     }
 
+    /// Adds covered points of [fringes](super::fringes), without an area.
+    #[inline(always)]
+    pub fn add_points(&mut self, pixel: usize, mask: &Mask) {
+        let all = &mut self.at(pixel).mask;
+        for l in 0..WORDS {
+            all[l] |= mask[l];
+        }
+    }
+
+    /// Moves the share of each pixel's points that are covered, times the lines' peak, to `shares`, and forgets the
+    /// strokes.
+    pub fn take_shares(&mut self, peak: f32, shares: &mut Vec<f32>) {
+        let share = |&place: &u32| match self.coverage.get((place as usize).wrapping_sub(1)) {
+            Some(coverage) => count(&coverage.mask) as f32 * (peak * (1.0 / POINTS as f32)),
+            None => 0.0,
+        };
+        shares.extend(self.places.iter().map(share));
+        self.reset(self.places.len());
+    }
+
     /// As [`LineCoverage::is_full`].
     #[inline(always)]
     pub fn is_full(&self, pixel: usize) -> bool {
@@ -129,12 +149,18 @@ impl BandStrokes {
     /// As [`LineCoverage::add`].
     #[inline(always)]
     pub fn add(&mut self, pixel: usize, amount: Amount, mask: &Mask, peak: f32) {
+        self.at(pixel).add(amount, mask, peak);
+    }
+
+    /// The strokes of a pixel, which are none at first.
+    #[inline(always)]
+    fn at(&mut self, pixel: usize) -> &mut LineCoverage {
         let place = &mut self.places[pixel];
         if *place == 0 {
             self.coverage.push(LineCoverage::default());
             *place = self.coverage.len() as u32;
         }
-        self.coverage[*place as usize - 1].add(amount, mask, peak);
+        &mut self.coverage[*place as usize - 1]
     }
 }
 
@@ -188,6 +214,16 @@ impl BorderPoints {
     fn of(&self, pixel: usize) -> Option<&Mask> {
         self.masks.get((*self.places.get(pixel)? as usize).wrapping_sub(1))
     }
+}
+
+/// The area of a band's pixels that the lines of a pass cover.
+pub struct Covered<'a> {
+    /// The strokes of the visible parts of edges, or of all.
+    pub strokes: &'a BandStrokes,
+    /// The area that visible lines leave free, where that is known.
+    pub holes: &'a Holes,
+    /// Per pixel, the share that whole edges cover; empty unless their hidden parts are faded.
+    pub whole: &'a [f32],
 }
 
 /// Composites the strokes of line passes over a band's colours.
@@ -254,7 +290,7 @@ dispatch! {
     pub fn composite(
         compositor: &LineCompositor<'_>,
         lines: &LinePass,
-        covered: (&BandStrokes, &Holes),
+        covered: &Covered<'_>,
         seen: (&[Light], &[f32]),
         colors: &mut [[f32; 4]],
     ) = composite_kernel
@@ -264,7 +300,7 @@ dispatch! {
 fn composite_kernel(
     compositor: &LineCompositor<'_>,
     lines: &LinePass,
-    (strokes, holes): (&BandStrokes, &Holes),
+    covered: &Covered<'_>,
     (light, depths): (&[Light], &[f32]),
     colors: &mut [[f32; 4]],
 ) {
@@ -281,7 +317,7 @@ fn composite_kernel(
                 }
                 None => lines.color,
             };
-            composite_pixel(compositor, (lines, peak), (strokes, holes), (light, depths), i, line_color, c);
+            composite_pixel(compositor, (lines, peak), covered, (light, depths), i, line_color, c);
         }
     }
 }
@@ -291,18 +327,21 @@ fn composite_kernel(
 fn composite_pixel(
     compositor: &LineCompositor<'_>,
     (lines, peak): (&LinePass, f32),
-    (strokes, holes): (&BandStrokes, &Holes),
+    covered: &Covered<'_>,
     (light, depths): (&[Light], &[f32]),
     i: usize,
     line_color: impl Fn() -> [f32; 4],
     c: &mut [f32; 4],
 ) {
-    let (cover, mask) = match (holes.covered_share(i), strokes.of(i)) {
+    let (cover, mask) = match (covered.holes.covered_share(i), covered.strokes.of(i)) {
         (Some(cover), _) => (cover, &NO_POINTS),
         (None, Some(coverage)) => (coverage.covered_share(peak), &coverage.mask),
-        (None, None) => return,
+        (None, None) => (0.0, &NO_POINTS),
     };
-    if cover > 0.0 {
+    // What hidden parts cover beside visible ones, which are fainter by a factor. Below 0 only by rounding.
+    let hidden = covered.whole.get(i).map_or(0.0, |&whole| FADE * (whole - cover));
+    let all = cover + hidden;
+    if all > 0.0 {
         let line_color = line_color();
         let under = if is_composited(c) {
             [c[0], c[1], c[2], -c[3]]
@@ -311,10 +350,11 @@ fn composite_pixel(
             over_background(surface, compositor.background(i))
         };
         let mut color = light.get(i).map_or(line_color, |light| light.on_premultiplied(line_color));
+        let hidden_color = color;
         if let (Some(&depth), Some(peel)) = (depths.get(i), compositor.peel) {
             color = peel.tints.tinted(i, (depth, lines.tint_reach()), color);
         }
-        *c = std::array::from_fn(|k| cover * color[k] + under[k] * (1.0 - cover * color[3]));
+        *c = std::array::from_fn(|k| (cover * color[k] + hidden * hidden_color[k]) + under[k] * (1.0 - all * color[3]));
         c[3] = -c[3];
     }
 }

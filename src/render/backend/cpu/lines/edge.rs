@@ -1,7 +1,7 @@
 //! The drawing of an edge as a line of exact width (stage lines). Twin of `shaders/lines/edge.wgsl`.
 //!
-//! A line is all that lies within half its width of the parts of an edge that its pass draws: all, or only the
-//! visible or the hidden ones, which [`hidden_lines`](super::hidden_lines) finds. Each part is a [`stroke`], and in
+//! A line is all that lies within half its width of the parts of an edge that are drawn: all, or only the visible
+//! ones, which [`hidden_lines`](super::hidden_lines) finds. Each part is a [`stroke`], and in
 //! each pixel the union of all strokes counts ([`coverage`](super::coverage)). Where something may hide them, long
 //! edges are processed in windows, which are stretches of some pixels, so that a pixel's lines depend only on what is
 //! near it.
@@ -16,7 +16,7 @@ use crate::backend::cpu::geometry::transform::recip;
 use crate::backend::cpu::isa::LANES;
 use crate::backend::cpu::lines::coverage::BandStrokes;
 use crate::backend::cpu::lines::hidden_lines::{HiddenIntervals, Parts};
-use crate::plan::{Edge, LinePass, Shown};
+use crate::plan::{Edge, LinePass};
 
 /// Output of a line pass: rows of a band.
 pub struct LineTarget<'a> {
@@ -50,6 +50,15 @@ impl LineTarget<'_> {
     }
 }
 
+/// The parts of edges that are drawn at a time.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Drawn {
+    /// All.
+    Whole,
+    /// Those that no surface hides.
+    Visible,
+}
+
 /// Draws the edges of a pass into a band.
 pub struct LineDrawer<'a> {
     context: &'a RasterContext<'a>,
@@ -63,22 +72,22 @@ pub struct LineDrawer<'a> {
     pub(super) direction: Direction,
     /// Windows per pixel of an edge's length.
     windows: f32,
-    /// True if a surface may hide a line.
-    is_hidden: bool,
+    /// True if parts that a surface hides are left out.
+    hides: bool,
     hidden: HiddenIntervals,
     /// True if the edges are rims: they are drawn everywhere, and mark the pixels that they reach.
     pub marks: bool,
     /// Pixels since the last deadline poll.
     pixels_since_poll: u64,
-    /// Shown intervals of the edge in the window.
+    /// Drawn intervals of the edge in the window.
     intervals: Vec<[f32; 2]>,
 }
 
 impl<'a> LineDrawer<'a> {
-    /// A drawer for a pass and the rows of a band that are shown.
+    /// A drawer for a pass and the rows of a band that are shown. It draws the visible parts of edges, or all of them.
     pub fn new(
         context: &'a RasterContext<'a>,
-        lines: &'a LinePass,
+        (lines, parts): (&'a LinePass, Drawn),
         (band, farthest): (&'a SampleBand, &'a mut Farthest),
     ) -> Self {
         // Without a surface nothing hides a line, and there is no visibility buffer to read.
@@ -92,7 +101,7 @@ impl<'a> LineDrawer<'a> {
             pen: Pen::new(context.isa, lines),
             direction: Direction::new(),
             windows: 1.0 / lines.window_px(),
-            is_hidden: something_hides && lines.shown != Shown::All,
+            hides: something_hides && parts == Drawn::Visible,
             hidden: HiddenIntervals::default(),
             marks: false,
             pixels_since_poll: 0,
@@ -117,7 +126,7 @@ impl<'a> LineDrawer<'a> {
         let mut has_direction = false;
         let owner =
             if self.lines.lit && !target.owners.is_empty() { self.context.lighting_face(self.lines, edge) } else { 0 };
-        let windows = if self.is_hidden { (segment.length * self.windows) as u32 + 1 } else { 1 };
+        let windows = if self.hides { (segment.length * self.windows) as u32 + 1 } else { 1 };
         let step = recip(windows as f32);
         for window in 0..windows {
             let range = [window as f32 * step, (window + 1) as f32 * step];
@@ -220,12 +229,12 @@ impl<'a> LineDrawer<'a> {
         }
     }
 
-    /// Collects the shown intervals of an edge in a window, and as far beyond as the line touches
+    /// Collects the drawn intervals of an edge in a window, and as far beyond as the line touches
     /// the window's pixels. False if there are none.
     #[inline(always)]
     fn collect_intervals(&mut self, edge: &Edge, segment: &Segment, range: [f32; 2]) -> bool {
         self.intervals.clear();
-        if !self.is_hidden {
+        if !self.hides {
             self.intervals.push(range);
             return true;
         }
@@ -237,11 +246,7 @@ impl<'a> LineDrawer<'a> {
             self.hidden.find((self.context, self.band, &mut *self.farthest), edge, segment, range);
         }
         let parts = Parts { context: self.context, lines: self.lines, band: self.band, edge, segment };
-        if self.lines.shown == Shown::Visible {
-            self.hidden.visible(&parts, range, &mut self.intervals);
-        } else {
-            self.hidden.hidden(&parts, range, &mut self.intervals);
-        }
+        self.hidden.visible(&parts, range, &mut self.intervals);
         !self.intervals.is_empty()
     }
 }

@@ -168,27 +168,6 @@ impl HiddenIntervals {
             intervals.push([from, range[1]]);
         }
     }
-
-    /// Appends the intervals of the range between the visible ones to `intervals`, in order.
-    #[inline(always)]
-    pub fn hidden(&self, parts: &Parts<'_>, range: [f32; 2], intervals: &mut Vec<[f32; 2]>) {
-        let first = intervals.len();
-        self.visible(parts, range, intervals);
-        let mut from = range[0];
-        let mut kept = first;
-        for i in first..intervals.len() {
-            let [start, end] = intervals[i];
-            if from < start {
-                intervals[kept] = [from, start];
-                kept += 1;
-            }
-            from = end;
-        }
-        intervals.truncate(kept);
-        if from < range[1] {
-            intervals.push([from, range[1]]);
-        }
-    }
 }
 
 /// Parts of an edge beside hidden ones.

@@ -10,7 +10,8 @@
 //! Most pixels need no strokes if all edges of an opaque surface are drawn
 //! ([`has_holes_under`](crate::plan::DrawPlan::has_holes_under) has all conditions): [`holes`]
 //! finds the parts of faces that lines leave free, and all else is covered. Mainly the pixels near
-//! rims, where the surface ends on screen, get strokes then.
+//! rims, where the surface ends on screen, get strokes then. Where hidden parts of lines fade, [`fringes`] tell
+//! what whole edges cover.
 
 pub(crate) mod candidates;
 pub(crate) mod contour;
@@ -18,6 +19,7 @@ pub(crate) mod coplanar;
 pub(crate) mod coverage;
 pub(crate) mod edge;
 pub(crate) mod farthest;
+pub(crate) mod fringes;
 pub(crate) mod hidden_lines;
 pub(crate) mod holes;
 pub(crate) mod line_light;

@@ -29,7 +29,7 @@ pub type Mask = [u16; WORDS];
 pub type PerPoint = [[i16; WORDS]; BITS];
 
 /// Positions of the points, in 1/65536 px right of and below the pixel's middle.
-static LATTICE: [PerPoint; 2] = [lattice(GENERATORS[0]), lattice(GENERATORS[1])];
+pub(super) static LATTICE: [PerPoint; 2] = [lattice(GENERATORS[0]), lattice(GENERATORS[1])];
 
 /// Steps to the pixel in which along and across are measured.
 pub const UNIT: f32 = 16_384.0;
@@ -160,7 +160,7 @@ dispatch! {
 }
 
 #[inline(always)]
-fn places_kernel([x, y]: [i16; 2], places: &mut PerPoint) {
+pub(super) fn places_kernel([x, y]: [i16; 2], places: &mut PerPoint) {
     for ((right, down), places) in LATTICE[0].iter().zip(&LATTICE[1]).zip(places) {
         // Complete before it is stored: else the compiler has to assume that a store may change the direction.
         let mut row = [0; WORDS];
@@ -173,7 +173,7 @@ fn places_kernel([x, y]: [i16; 2], places: &mut PerPoint) {
 
 /// The place of a point in a direction.
 #[inline(always)]
-fn place(direction: [i16; 2], point: [i16; 2]) -> i16 {
+pub(super) fn place(direction: [i16; 2], point: [i16; 2]) -> i16 {
     high(direction[0], point[0]).wrapping_add(high(direction[1], point[1]))
 }
 
@@ -464,7 +464,7 @@ impl Range {
 /// Moves a word up by a bit, and puts a bit below. In a loop over words, compilers make vectors of
 /// this.
 #[inline(always)]
-fn push(word: &mut u16, bit: bool) {
+pub(super) fn push(word: &mut u16, bit: bool) {
     *word = (word.wrapping_add(*word)).wrapping_add(u16::from(bit));
 }
 

@@ -31,6 +31,7 @@ impl Kernel {
             Self::MixedSum => "mixed_sum",
             Self::Holes => "holes",
             Self::Tips => "tips",
+            Self::Fringes => "fringes",
             Self::Edge => "edge",
             Self::Coverage => "coverage",
             Self::LineLight => "line_light",

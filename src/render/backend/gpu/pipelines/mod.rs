@@ -76,6 +76,8 @@ pub enum Kernel {
     Holes,
     /// Triangles to the pixels around their tips.
     Tips,
+    /// Triangles to the points of their fringes.
+    Fringes,
     /// Edges to strokes.
     Edge,
     /// Unites the strokes of a line pass in each pixel and composites them over the colours.
@@ -258,7 +260,9 @@ impl Kernel {
             }
             Self::Grid | Self::Gather => DrawStage::Occlusion,
             Self::Composite | Self::Shade | Self::Paint => DrawStage::Shade,
-            Self::Holes | Self::Tips | Self::Edge | Self::Coverage | Self::LineLight => DrawStage::Lines,
+            Self::Holes | Self::Tips | Self::Fringes | Self::Edge | Self::Coverage | Self::LineLight => {
+                DrawStage::Lines
+            }
             Self::Resolve => DrawStage::Resolve,
         }
     }

@@ -27,7 +27,7 @@ fn kernels() -> Vec<Kernel> {
         Kernel::Edge,
         Kernel::Coverage,
     ];
-    all.extend([Kernel::Holes, Kernel::Tips, Kernel::LineLight, Kernel::Resolve, Kernel::Paint]);
+    all.extend([Kernel::Holes, Kernel::Tips, Kernel::Fringes, Kernel::LineLight, Kernel::Resolve, Kernel::Paint]);
     all.extend([Kernel::Breaks, Kernel::Thin, Kernel::MixedPixels, Kernel::MixedColor]);
     all.extend([Kernel::MixedParts, Kernel::MixedShade, Kernel::MixedSum]);
     for write in [SampleWrite::Both, SampleWrite::Depth, SampleWrite::Id] {

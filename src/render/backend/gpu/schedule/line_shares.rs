@@ -10,6 +10,7 @@ use crate::backend::gpu::params::{Batch, faces_code, fade_places, line_flags};
 use crate::backend::gpu::pass_mask::Pass;
 use crate::backend::gpu::pipelines::Kernel;
 use crate::backend::gpu::schedule::Schedule;
+use crate::backend::sample_partition::POINTS;
 use crate::plan::{DrawPlan, LinePass};
 
 /// Edges per dispatch.
@@ -60,7 +61,7 @@ pub const NO_LIMIT: u32 = u32::MAX;
 pub const PROGRESS_HEAD_BYTES: u64 = 4;
 
 /// Bytes of what a paused workgroup remembers.
-pub const PAUSED_BYTES: u64 = 16;
+pub const PAUSED_BYTES: u64 = 12;
 
 /// Parameters of the edge kernel for a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -165,6 +166,16 @@ impl Schedule {
                 line_fade,
                 ..pixels
             };
+            if plan.fades_hidden(lines) {
+                let flags = lined.line_flags & !(line_flags::SHOWN_VISIBLE | line_flags::TINTED_PASS);
+                let mut whole = Batch { line_flags: flags, ..lined };
+                if plan.has_fringes_under(lines) {
+                    whole = with(whole, line_flags::FRINGES);
+                    self.per_triangle(plan, device, (Kernel::Fringes, POINTS as u32 / 32), whole)?;
+                }
+                self.edges(device, lines, edges_first, shares, whole)?;
+                self.dispatch(device, Kernel::Coverage, pixels.count, whole)?;
+            }
             let has_holes = plan.has_holes_under(lines);
             if has_holes {
                 self.holes(plan, device, lines, lined)?;
@@ -192,11 +203,22 @@ impl Schedule {
         let beyond = 2 * lines.hidden_reach_px();
         let rows = lined.row_end.abs_diff(lined.row_first) + beyond;
         self.dispatch(device, Kernel::Holes, (plan.width_px + beyond) * rows, lined)?;
+        self.per_triangle(plan, device, (Kernel::Tips, 1), lined)
+    }
+
+    /// A kernel of lines that looks at each triangle of the surface, with so many threads.
+    fn per_triangle(
+        &mut self,
+        plan: &DrawPlan<'_>,
+        device: &DeviceTraits,
+        (kernel, threads): (Kernel, u32),
+        lined: Batch,
+    ) -> Result<(), DrawError> {
         let Some(Pass { ids, faces, pass_bit, .. }) = Pass::of_visibility(plan)[0].clone() else { return Ok(()) };
         for first in ids.clone().step_by(CHUNK as usize) {
             let (count, pass_bit) = (CHUNK.min(ids.end - first), u32::from(pass_bit));
             let batch = Batch { first, count, faces: faces_code(faces), pass_bit, ..lined };
-            self.dispatch(device, Kernel::Tips, count, batch)?;
+            self.dispatch(device, kernel, count * threads, batch)?;
         }
         Ok(())
     }

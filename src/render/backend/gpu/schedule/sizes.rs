@@ -29,8 +29,8 @@ pub const PEEL_STATE_BYTES: u64 = 32;
 pub const SAMPLE_BYTES: u64 = 8;
 
 /// Bytes of a pixel's strokes: two sums, how often they have gone round, a bit for each of 256
-/// points, the most that an area differs from its points', and the area of holes.
-pub const STROKES_BYTES: u64 = 52;
+/// points, the most that an area differs from its points', the area of holes, and what whole edges cover.
+pub const STROKES_BYTES: u64 = 56;
 
 /// Bytes per pixel that name the face by which the pixel's lines are lit.
 const OWNER_BYTES: u64 = 4;

@@ -68,7 +68,7 @@ pub fn each_case(mut each: impl FnMut(&DrawPlan<'_>, Case)) {
     for size_px in [[4096, 4096], [4096, 100], [100, 4096], [1, 1], [640, 480]] {
         for samples in [1, 4, 8, 16] {
             for (width_px, shown) in
-                [(1.0, Shown::All), (100.0, Shown::All), (9.0, Shown::Hidden), (100.0, Shown::Visible)]
+                [(1.0, Shown::All), (100.0, Shown::All), (9.0, Shown::Faded), (100.0, Shown::Visible)]
             {
                 for (is_peeled, passes) in [(false, 1), (true, 1), (false, 128), (true, 0)] {
                     let mut case = Case { size_px, samples, is_peeled, passes, width_px, shown, beyond: 0 };

@@ -10,6 +10,7 @@ use crate::backend::cpu::context::RasterContext;
 use crate::backend::cpu::geometry::setups::{CornerLanes, Extents, transposed_half};
 use crate::backend::cpu::geometry::transform::OUTSIDE;
 use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::lines::fringes::FRINGED_MAX;
 use crate::backend::cpu::mixed::thinness::is_thin;
 
 /// As `keep` of the parent, given the pass's triangles.
@@ -35,10 +36,14 @@ pub fn keep<V: Simd>(
         let lanes = Lanes::new(simd, &corners, bounds);
         let drawn = pass.drawn(context.plan, first, group.len());
         let whole = !lanes.outside & ((1 << group.len()) - 1);
-        kept.sides.push(Sides { front: (lanes.front & whole) as u8, back: (lanes.back & whole) as u8 });
+        kept.sides.push(Sides {
+            front: (lanes.front & whole) as u8,
+            back: (lanes.back & whole) as u8,
+            wide: lanes.wide as u8,
+        });
         let (front, back) = (lanes.front & lanes.seen & drawn[0], lanes.back & lanes.seen & drawn[1]);
         if front != 0 {
-            if bounds.has_mixed {
+            if bounds.has_points {
                 lanes.put_boxed(simd, first, front, &mut kept.fronts);
             }
             lanes.put(simd, first, front, &mut kept.fronts);
@@ -47,7 +52,7 @@ pub fn keep<V: Simd>(
             lanes.put_boxed(simd, first, back, &mut kept.backs);
             lanes.put(simd, first, back, &mut kept.backs);
         }
-        if bounds.has_mixed && front | back != 0 {
+        if bounds.has_points && front | back != 0 {
             let thin = thin(&corners, front | back);
             if thin != 0 {
                 lanes.put_boxed(simd, first, thin, &mut kept.thin);
@@ -82,11 +87,12 @@ fn corner_of<V: Simd>(CornerLanes { x, y, .. }: &CornerLanes<V>, l: usize) -> [[
 
 /// Eight triangles on screen.
 struct Lanes<V: Simd> {
-    /// Bits of the lanes that face the viewer, face away, may have samples, lie outside.
+    /// Bits of the lanes that face the viewer, face away, may have samples, lie outside, are wide or lie outside.
     front: u32,
     back: u32,
     seen: u32,
     outside: u32,
+    wide: u32,
     span: i32x8<V>,
     columns: i32x8<V>,
     rows: i32x8<V>,
@@ -114,6 +120,7 @@ impl<V: Simd> Lanes<V> {
             back,
             seen: !bits(is_empty) & !outside,
             outside,
+            wide: bits(extent(x).simd_gt(FRINGED_MAX) | extent(y).simd_gt(FRINGED_MAX)) | outside,
             span: pairs(band_of(first_row, bounds), band_of(last_row, bounds)),
             columns: pairs(columns.first, columns.last),
             rows: pairs(rows.first, rows.last),
@@ -145,6 +152,12 @@ impl<V: Simd> Lanes<V> {
         }
         push(&mut kept.boxed, bits.count_ones() as usize, bytemuck::must_cast::<_, [BoxedFace; LANES]>(faces));
     }
+}
+
+/// The distance between the least and the greatest of three. Only what lies outside wraps.
+#[inline(always)]
+fn extent<V: Simd>(v: &[i32x8<V>; 3]) -> i32x8<V> {
+    v[0].max(v[1]).max(v[2]) - v[0].min(v[1]).min(v[2])
 }
 
 /// A bit for each lane.

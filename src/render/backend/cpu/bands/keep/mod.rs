@@ -1,7 +1,7 @@
 //! Culling of triangles before they are sorted into bands (ranges of pixel rows that one thread draws at a time). It
 //! leaves out triangles that the pass does not draw, or not from the side that the viewer sees, and triangles that no
-//! sample can show: they are seen edge-on, or lie outside the picture, or between the rows or columns of samples. If
-//! samples are adaptive, the points of mixed pixels count instead.
+//! sample can show: they are seen edge-on, or lie outside the picture, or between the rows or columns of samples. Where
+//! mixed pixels or fringes are drawn from the triangles, a pixel's 256 points count instead.
 //!
 //! Triangles that have to be clipped are listed apart. Thin ones that samples may miss are also in a list of their
 //! own, if samples are adaptive: the stage mixed looks for them.
@@ -27,8 +27,8 @@ pub struct TrianglePass {
     pub pass_bit: u8,
     /// The faces that are drawn, where a triangle's pass mask does not say.
     pub faces: Faces,
-    /// True if mixed pixels are drawn from these triangles.
-    pub has_mixed: bool,
+    /// True if all triangles count in which a pixel has one of its 256 points, as for mixed pixels and fringes.
+    pub has_points: bool,
 }
 
 impl TrianglePass {
@@ -72,9 +72,8 @@ impl TrianglePass {
 /// The rectangle of the picture that has samples, and its bands.
 pub struct Bounds {
     pub grid: SampleGrid,
-    /// True for pictures with mixed pixels. Thin triangles are listed then, and triangles that face the viewer have
-    /// boxes.
-    pub has_mixed: bool,
+    /// As the pass has it. Thin triangles are listed then, and triangles that face the viewer have boxes.
+    pub has_points: bool,
     /// The picture's centre, 1/256 px from its corner.
     pub half: [i32; 2],
     /// Columns, and rows, that have samples.
@@ -89,10 +88,10 @@ pub struct Bounds {
 
 impl Bounds {
     /// Those of a plan's picture, for a pass from whose triangles mixed pixels are drawn or not.
-    pub fn new(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2], has_mixed: bool) -> Self {
+    pub fn new(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2], has_points: bool) -> Self {
         Self {
-            has_mixed,
-            grid: if has_mixed { POINT_GRID } else { SampleGrid::new(plan.samples) },
+            has_points,
+            grid: if has_points { POINT_GRID } else { SampleGrid::new(plan.samples) },
             half: [plan.width_px, plan.height_px].map(|size| size as i32 * 128),
             ranges: [plan.seen_range(plan.width_px), plan.seen_range(plan.height_px)],
             rows: rows as i32,
@@ -131,7 +130,7 @@ impl Bounds {
 
 /// Triangles of a chunk that culling leaves.
 pub struct Kept {
-    /// Triangles that face the viewer; with boxes if the picture has mixed pixels.
+    /// Triangles that face the viewer; with boxes if points count.
     pub fronts: KeptFaces,
     /// Triangles that face away, with boxes.
     pub backs: KeptFaces,
@@ -149,13 +148,16 @@ pub struct Kept {
 pub struct Sides {
     pub front: u8,
     pub back: u8,
+    /// A bit for each that is wider or higher than [`FRINGED_MAX`](crate::backend::cpu::lines::fringes::FRINGED_MAX),
+    /// or lies outside.
+    pub wide: u8,
 }
 
 impl Kept {
     /// Room for so many triangles.
     pub fn with_room_for(triangles: usize, bounds: &Bounds) -> Self {
         Self {
-            fronts: KeptFaces::with_room_for(triangles, bounds.has_mixed),
+            fronts: KeptFaces::with_room_for(triangles, bounds.has_points),
             backs: KeptFaces::with_room_for(triangles, true),
             thin: KeptFaces::default(),
             outside: Vec::new(),
@@ -184,6 +186,7 @@ mod tests {
     use crate::backend::cpu::bands::lists::{BoxedFace, pair};
     use crate::backend::cpu::geometry::setups::Corners;
     use crate::backend::cpu::geometry::transform::OUTSIDE;
+    use crate::backend::cpu::lines::fringes::FRINGED_MAX;
     use crate::backend::cpu::mixed::thinness::is_thin;
     use crate::backend::cpu::stopwatch::Stopwatch;
     use crate::backend::cpu::{CpuRenderer, Isa};
@@ -208,6 +211,7 @@ mod tests {
                 let lane = Lane::new(&corners, l, bounds, depth_max);
                 sides.front |= u8::from(!lane.is_outside && lane.area < 0) << l;
                 sides.back |= u8::from(!lane.is_outside && lane.area > 0) << l;
+                sides.wide |= u8::from(lane.is_outside || lane.is_wide) << l;
                 let is_drawn = |k: usize| drawn[k] >> l & 1 != 0;
                 if lane.is_outside && (is_drawn(0) || is_drawn(1)) {
                     kept.outside.push(ids[l]);
@@ -215,7 +219,7 @@ mod tests {
                 if lane.is_seen && lane.area < 0 && is_drawn(0) {
                     kept.fronts.ids.push(ids[l]);
                     kept.fronts.spans.push(lane.span);
-                    if bounds.has_mixed {
+                    if bounds.has_points {
                         kept.fronts.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
                     }
                 }
@@ -241,6 +245,7 @@ mod tests {
         is_outside: bool,
         is_seen: bool,
         is_thin: bool,
+        is_wide: bool,
         area: i64,
         /// As [`KeptFaces`] has it.
         span: u32,
@@ -259,7 +264,10 @@ mod tests {
             Self {
                 is_outside,
                 is_seen,
-                is_thin: bounds.has_mixed && is_thin(x, y, area),
+                is_thin: bounds.has_points && is_thin(x, y, area),
+                is_wide: [x, y]
+                    .iter()
+                    .any(|v| v.iter().max() > v.iter().min().map(|least| least + FRINGED_MAX).as_ref()),
                 area,
                 span: if is_seen { pair([top / bounds.rows, bottom / bounds.rows]) } else { 0 },
                 boxed: BoxedFace { id: 0, columns: pair(columns), rows: pair(rows), depth_max },
@@ -287,8 +295,12 @@ mod tests {
         plan.is_adaptive = true;
         plan.hull = Some(HullPass::default());
         let deadline = Deadline::default();
-        let pass =
-            TrianglePass { ids: 3..triangles.len(), pass_bit: pass_mask::SURFACE, faces: Faces::Both, has_mixed: true };
+        let pass = TrianglePass {
+            ids: 3..triangles.len(),
+            pass_bit: pass_mask::SURFACE,
+            faces: Faces::Both,
+            has_points: true,
+        };
         let bounds = Bounds::new(&plan, [17, margin], true);
         let lists = |isa: Isa, keep: fn(&RasterContext<'_>, &Bounds, &TrianglePass) -> Kept| {
             let mut cpu = CpuRenderer::with_isa(1, isa);
