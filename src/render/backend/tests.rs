@@ -198,6 +198,8 @@ const SHADER_ONLY: &[&str] = &[
     "LIST_MAX",
     "PARTS_OF_PIXEL",
     "WHOLE",
+    "WHOLE_WORD",
+    "FRESH",
     "STEP_NONE",
     "STEP_SLIGHT",
     "STEP_HARD",

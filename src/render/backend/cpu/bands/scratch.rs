@@ -400,6 +400,9 @@ mod tests {
                 }
                 scratch.colors = Vec::with_capacity(pixels);
                 scratch.strokes.reset(pixels);
+                if plan.lines.iter().any(|lines| plan.fades_hidden(lines)) {
+                    scratch.whole = Vec::with_capacity(pixels);
+                }
                 scratch.owners = Vec::with_capacity(pixels);
                 scratch.light = Vec::with_capacity(pixels);
                 scratch.peel = plan.peeling().map(|_| PeelBand::new(&scratch.samples, scratch.rows));

@@ -136,6 +136,7 @@ impl BandStrokes {
             Some(coverage) => count(&coverage.mask) as f32 * (peak * (1.0 / POINTS as f32)),
             None => 0.0,
         };
+        shares.reserve_exact(self.places.len());
         shares.extend(self.places.iter().map(share));
         self.reset(self.places.len());
     }
