@@ -148,9 +148,10 @@ const FACES_FRONT: u32 = 1u;
 const FACES_BACK: u32 = 2u;
 
 // Bits of `line_flags`.
-// Only what nothing hides is drawn.
+// Strokes are those of the parts that nothing hides.
 const SHOWN_VISIBLE: u32 = 1u;
-// Hidden parts are drawn too, fainter. Without SHOWN_VISIBLE, the strokes are those of whole edges, for these parts.
+// Hidden parts are drawn too, fainter. Without SHOWN_VISIBLE, strokes are those of whole edges, of which coverage.wgsl
+// keeps the share that they cover.
 const FADES_HIDDEN: u32 = 2u;
 const SKIP_BACK: u32 = 4u;
 const CONTOUR: u32 = 8u;

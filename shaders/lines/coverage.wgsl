@@ -1,7 +1,9 @@
 // The coverage of each pixel by the lines of a pass (lines of one width and colour), and the compositing of their
 // colour over the pixel, weighted by the coverage (stage lines). A stroke is the area that the line of one part of
 // an edge covers. The coverage is that of the union of all strokes in the pixel, or follows from the area that
-// lines leave free (holes/holes.wgsl). Twin of src/render/backend/cpu/lines/coverage.rs.
+// lines leave free (holes/holes.wgsl). Where hidden parts fade, what whole edges cover beyond the visible parts counts
+// a quarter: the kernel runs after the strokes of whole edges, and again after those of visible parts. Twin of
+// src/render/backend/cpu/lines/coverage.rs.
 //
 // Uses: common.wgsl (ADAPTIVE, FADES_HIDDEN, FIRST_PASS, first_visibility_sample, has, HOLED,
 // HOLES, HULL, LIT_PASS, PEELING, recip, rn, rn3, rn4, rolled_off, sample_count, SHOWN_VISIBLE,
@@ -40,7 +42,7 @@
 // difference between a stroke and its points. Of more strokes in one pixel, some overlap.
 const STROKES_SIDE_BY_SIDE: f32 = 4.0;
 
-// Alpha of hidden parts beside that of visible ones, where hidden parts are faded.
+// The share of their colour that fading hidden parts keep.
 const FADE: f32 = 0.25;
 
 @compute @workgroup_size(WORKGROUP)
@@ -89,7 +91,8 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
         points = covered_points(at);
         cover = covered_share(sum, all, points, slack_of(at));
     }
-    // What hidden parts cover beside visible ones, which are fainter by a factor. Below 0 only by rounding.
+    // What hidden parts cover beside visible ones, times the share of the colour that they keep. Less than 0 where
+    // points miss some of the area that visible parts cover: no more is lost of it than that share.
     var hidden = 0.0;
     if (batch.line_flags & FADES_HIDDEN) != 0u {
         hidden = rn(FADE * (whole - cover));
@@ -126,8 +129,9 @@ fn clear_strokes(at: u32) {
     }
 }
 
-// Keeps the share of points that whole edges cover, for the strokes of their visible parts, which follow.
-// The light on them is that of the pixel's samples; any face will do where no stroke has named one.
+// Keeps the share of points that whole edges cover, for the visible parts, which follow. The light on both is that of
+// the pixel's samples; where there are none, that of the face with the highest id whose edge is drawn here, hidden or
+// not.
 fn keep_whole_share(i: u32) {
     let at = STROKE_WORDS * i;
     let sum = area_sum(at);

@@ -1,7 +1,7 @@
 // Stage lines, per edge: draws the edge as a line of exact width. The kernel finds the visible parts of the edge,
-// unless whole edges are drawn. To the pixels that a part touches (only to some, where holes/holes.wgsl finds the coverage) it adds a
-// stroke: all that lies within half the line's width of the part. coverage.wgsl makes colours of the strokes. Twin of
-// src/render/backend/cpu/lines/edge.rs.
+// unless whole edges are drawn. To the pixels that a part touches (only to some, where holes/holes.wgsl finds the
+// coverage) it adds a stroke: all that lies within half the line's width of the part. coverage.wgsl makes colours
+// of the strokes. Twin of src/render/backend/cpu/lines/edge.rs.
 //
 // An edge is cut along its length into windows, and the pixel rows of a window into slices. Such a slice is called
 // a share here. A workgroup has some edges. Each of its threads looks at one share, to find out whether there is
@@ -14,10 +14,11 @@
 //
 // Uses: common.wgsl (FRINGES, has, HOLED, HOLES, LIT_PASS, recip, RIM_PASS, rn, SHOWN_VISIBLE,
 // TINTED_PASS, Vertex), one_job.wgsl (batch, frame), lines/contour.wgsl (is_drawn, is_silhouette,
-// lighting_face), lines/fringed.wgsl (is_fringed), lines/hidden_lines.wgsl (begin_runs, BEYOND, count_found, has_too_many,
-// is_all_hidden, joined_run, look_around, shows_interval), lines/segment.wgsl (depth_of, point_at,
-// rows_of, Segment, segment_of, SLACK_PX), lines/stroke.wgsl (add_stroke, is_full, place_of,
-// reach_of_line, touches), lines/stroke_words.wgsl (HOLE_WORD, point_marks, STROKE_WORDS, STROKED).
+// lighting_face), lines/fringed.wgsl (is_fringed), lines/hidden_lines.wgsl (begin_runs, BEYOND,
+// count_found, has_too_many, is_all_hidden, joined_run, look_around, shows_interval),
+// lines/segment.wgsl (depth_of, point_at, rows_of, Segment, segment_of, SLACK_PX),
+// lines/stroke.wgsl (add_stroke, is_full, place_of, reach_of_line, touches),
+// lines/stroke_words.wgsl (HOLE_WORD, point_marks, STROKE_WORDS, STROKED).
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;

@@ -86,6 +86,11 @@ fn offset_of(distance: f32) -> i32 {
 
 // Adds the points of word w of a pixel's mask that lie in the fringe.
 fn add_points_of(sides: FringeSides, pixel_at: u32, w: u32) {
+    let at = pixel_at * STROKE_WORDS + MASK_WORD + w;
+    let covered = atomicLoad(&strokes[at]);
+    if covered == 0xFFFFFFFFu {
+        return;
+    }
     var mask = 0u;
     // frame.zero keeps compilers from unrolling the loop.
     for (var half = 0u; half < 2u + frame.zero; half++) {
@@ -94,8 +99,8 @@ fn add_points_of(sides: FringeSides, pixel_at: u32, w: u32) {
             | points_of_fringe(sides, word, 8u) | points_of_fringe(sides, word, 12u);
         mask |= points << (16u * half);
     }
-    if mask != 0u {
-        atomicOr(&strokes[pixel_at * STROKE_WORDS + MASK_WORD + w], mask);
+    if (mask & ~covered) != 0u {
+        atomicOr(&strokes[at], mask);
     }
 }
 

@@ -1,8 +1,8 @@
 // The layout of the buffer `strokes` (stage lines): 14 words per pixel about its strokes (a stroke is the area
-// that the line of one part of an edge covers) and about the area that lines leave free. The kernels edge, holes,
-// tips and coverage write to them. At the end of a pass coverage.wgsl reads them and sets them to zero for the
-// next pass. The CPU has a struct, LineCoverage in src/render/backend/cpu/lines/coverage.rs, so this file has no
-// twin.
+// that the line of one part of an edge covers) and about the area that lines leave free. The kernels edge, fringes,
+// holes, tips and coverage write to them. At the end of a pass coverage.wgsl reads them and sets them to zero for the
+// next pass. Where hidden parts fade it also does so after the strokes of whole edges, and keeps WHOLE_WORD. The CPU has
+// a struct, LineCoverage in src/render/backend/cpu/lines/coverage.rs, so this file has no twin.
 //
 // Uses: common.wgsl (sample_count).
 

@@ -134,10 +134,10 @@ pub struct Batch {
 pub mod line_flags {
     use crate::plan::{DrawPlan, FaceSide, LinePass, Shown};
 
-    /// Only what nothing hides is drawn.
+    /// Strokes are those of the parts that nothing hides.
     pub const SHOWN_VISIBLE: u32 = 1;
-    /// Hidden parts are drawn too, fainter. Without [`SHOWN_VISIBLE`], the strokes are those of whole edges, for these
-    /// parts.
+    /// Hidden parts are drawn too, fainter. Without [`SHOWN_VISIBLE`], strokes are those of whole edges, and the kernel
+    /// coverage keeps the share that they cover.
     pub const FADES_HIDDEN: u32 = 2;
     /// Edges whose faces all face away are left out.
     pub const SKIP_BACK: u32 = 4;

@@ -13,7 +13,7 @@ use crate::plan::edges::select::select;
 use crate::plan::edges::silhouettes::{Silhouettes, hides_inside, unseen_side};
 use crate::plan::outline::parts::contours;
 use crate::plan::skips::SkipKind;
-use crate::plan::{Edge, LinePass, PlanError, Projection, Projector};
+use crate::plan::{Edge, LinePass, PlanError, Projection, Projector, Shown};
 use crate::scene::Scene;
 use crate::spec::Hidden;
 
@@ -59,8 +59,9 @@ pub fn passes(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<Lin
             let mut pass = style.pass(&edges, hides, unseen_side.filter(|_| !is_chosen));
             pass.contour &= !is_chosen;
             // Entries in the lists of up to four bands of the picture, a box of pixels, and whether it is a
-            // silhouette.
-            cx.budget.spend("lists of edges", edges.len() as u64, 16 + 8 + 1)?;
+            // silhouette. Of faces without a fringe, entries in a list of their own.
+            let unfringed = if pass.shown == Shown::Faded && pass.is_complete { 16 } else { 0 };
+            cx.budget.spend("lists of edges", edges.len() as u64, 16 + 8 + 1 + unfringed)?;
             passes.push(pass);
         }
     }

@@ -237,7 +237,6 @@ pub enum Shown {
     All,
     /// The parts that no surface hides.
     Visible,
-    /// All of it, of which the parts that a surface hides are fainter ([`FADE`](crate::plan::FADE)) and lie below the
-    /// others.
+    /// All of it. The parts that a surface hides are fainter ([`FADE`](crate::plan::FADE)), and lie beside the others.
     Faded,
 }

@@ -2,13 +2,15 @@
 //! all edges are lines. They give the same lines as strokes alone, on both back-ends. What the
 //! lines should be, the accuracy suite tests.
 
+use std::sync::Arc;
+
 use meshsnap_render::backend::Renderer;
 use meshsnap_render::backend::cpu::CpuRenderer;
 use meshsnap_render::backend::gpu::GpuRenderer;
 use meshsnap_render::image::Image;
 use meshsnap_render::limits::Deadline;
 use meshsnap_render::mesh::Mesh;
-use meshsnap_render::plan::DrawPlan;
+use meshsnap_render::plan::{DrawPlan, Edge, LinePass, Shown};
 
 use crate::support::gpus::gpus_of_case;
 use crate::support::likeness::{Likeness, Tolerance};
@@ -123,6 +125,33 @@ fn holes_and_strokes_tell_of_the_same_lines() {
     assert_eq!(cases, pictures);
     assert!(cases >= 10 * (LOOKS.len() + FADED.len()), "{cases}");
     assert!(different > cases / 2, "{different} of {cases} pictures have a pixel that holes tell");
+}
+
+/// Both faces of a sheet, exactly edge-on: no sample shows them, none of their edges is a rim, and they have no fringe.
+#[test]
+fn edges_between_faces_seen_edge_on_are_drawn_alike() {
+    let mut cases = 0;
+    for half_px in [30.0, 3.0] {
+        let positions = [[-half_px, -0.5 * half_px, 0.5], [half_px, 0.5 * half_px, 0.4], [0.0, 0.0, 0.6]];
+        let triangles = [[0, 1, 2], [0, 2, 1]];
+        let edges = [[0, 1], [1, 2], [2, 0]].map(|vertices| Edge { vertices, faces: [0, 1] });
+        let mut plan = scenes::screen_plan([96, 64], 4, 1.0, &positions, &triangles);
+        let pass = LinePass::new(Arc::new(edges.to_vec()), 1.5);
+        let color = [1.0, 0.0, 0.0, 1.0];
+        plan.lines = vec![LinePass { color, shown: Shown::Faded, is_complete: true, keeps_short_parts: true, ..pass }];
+        assert!(plan.has_fringes());
+        let deadline = Deadline::default();
+        let cpu = CpuRenderer::new(2).draw(&plan, &deadline).unwrap();
+        assert!(CpuRenderer::plain(1).draw(&plan, &deadline).unwrap() == cpu);
+        let drawn = cpu.rgba.chunks(4).filter(|p| p[0] > p[2].saturating_add(10)).count();
+        assert!(drawn as f32 > 2.0 * half_px, "{half_px}: {drawn} pixels");
+        for gpu in gpus_of_case(cases) {
+            let gpu = GpuRenderer::new(gpu.clone()).draw(&plan, &deadline).unwrap();
+            Likeness::of(&cpu, &gpu).assert(Tolerance::TWINS, &format!("{half_px} px"));
+        }
+        cases += 1;
+    }
+    assert_eq!(cases, 2);
 }
 
 #[test]

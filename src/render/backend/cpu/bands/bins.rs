@@ -42,8 +42,8 @@ pub struct EdgeBin {
     rows: u32,
     /// Those that are rims; empty where the pass has no holes.
     pub rims: Bin,
-    /// Those of wide faces that are no rims; empty where the pass has no fringes.
-    pub wide: Bin,
+    /// Those of faces without a fringe that are no rims; empty where the pass has no fringes at all.
+    pub unfringed: Bin,
     /// By edge of the chunk, true for a silhouette, drawn or not; empty where the pass has no holes.
     are_silhouettes: Vec<bool>,
     /// The others. Where the pass has holes, few bands need them: they are sorted when one does.
@@ -67,8 +67,8 @@ impl EdgeBin {
         (edges, triangles): (Range<usize>, &[TriangleBin]),
     ) -> Self {
         let bands = band_count(context.plan, rows);
-        let [rims, wide] = [(); 2].map(|()| Bin::new(bands, TALL_EDGE_BANDS));
-        let mut bin = Self { edges, rows, rims, wide, are_silhouettes: Vec::new(), others: OnceLock::new() };
+        let [rims, unfringed] = [(); 2].map(|()| Bin::new(bands, TALL_EDGE_BANDS));
+        let mut bin = Self { edges, rows, rims, unfringed, are_silhouettes: Vec::new(), others: OnceLock::new() };
         if !context.plan.has_holes_under(pass) {
             bin.others(context, pass);
             return bin;
@@ -84,33 +84,33 @@ impl EdgeBin {
             }
         }
         if context.plan.has_fringes_under(pass) {
-            bin.push_wide(context, pass, triangles);
+            bin.push_unfringed(context, pass, triangles);
         }
         bin
     }
 
-    /// Lists the edges of wide faces.
-    fn push_wide(&mut self, context: &RasterContext<'_>, pass: &LinePass, triangles: &[TriangleBin]) {
-        let is_wide = |face: u32| {
+    /// Lists the edges of faces without a fringe.
+    fn push_unfringed(&mut self, context: &RasterContext<'_>, pass: &LinePass, triangles: &[TriangleBin]) {
+        let is_unfringed = |face: u32| {
             let chunk = triangles.get(face as usize / CHUNK);
             let sides = chunk.and_then(|chunk| chunk.sides.get(face as usize % CHUNK / LANES));
-            sides.is_none_or(|sides| sides.wide >> (face as usize % LANES) & 1 != 0)
+            sides.is_none_or(|sides| sides.unfringed >> (face as usize % LANES) & 1 != 0)
         };
         for (n, i) in self.edges.clone().enumerate() {
             let edge = &pass.edges[i];
             if !self.are_silhouettes[n]
-                && edge.faces.into_iter().any(is_wide)
+                && edge.faces.into_iter().any(is_unfringed)
                 && let Some((_, bands)) = placed(context, edge, pass.reach_px(), self.rows)
             {
-                self.wide.push(i as u32, bands);
+                self.unfringed.push(i as u32, bands);
             }
         }
     }
 
-    /// True if the band has no rim and, where the pass has no holes, no other edge.
+    /// True if the band has no rim, no edge of a face without a fringe and, where the pass has no holes, no other edge.
     pub fn is_empty_in(&self, band: usize) -> bool {
         let others = self.others.get().into_iter().flat_map(|others| others.bin.items_in(band));
-        self.rims.items_in(band).chain(others).next().is_none()
+        self.rims.items_in(band).chain(self.unfringed.items_in(band)).chain(others).next().is_none()
     }
 
     /// The edges that are no rims.
@@ -222,14 +222,14 @@ fn passes(plan: &DrawPlan<'_>) -> (Vec<TrianglePass>, Vec<TrianglePass>) {
     let count = plan.triangles.len();
     // Layers are drawn from samples alone.
     let surface = |pass_bit| {
-        let has_points = (plan.has_mixed() || plan.has_fringes()) && pass_bit == pass_mask::SURFACE;
-        plan.surface.as_ref().map(|s| TrianglePass { ids: 0..count, pass_bit, faces: s.faces, has_points })
+        let has_mixed = plan.has_mixed() && pass_bit == pass_mask::SURFACE;
+        let has_points = has_mixed || (plan.has_fringes() && pass_bit == pass_mask::SURFACE);
+        plan.surface.as_ref().map(|s| TrianglePass { ids: 0..count, pass_bit, faces: s.faces, has_mixed, has_points })
     };
-    let around = |hull: &HullPass<'_>| TrianglePass {
-        ids: count..count + hull.triangles.len(),
-        pass_bit: 0,
-        faces: Faces::Both,
-        has_points: plan.has_mixed() && !plan.has_peeled_hull(),
+    let around = |hull: &HullPass<'_>| {
+        let has_mixed = plan.has_mixed() && !plan.has_peeled_hull();
+        let ids = count..count + hull.triangles.len();
+        TrianglePass { ids, pass_bit: 0, faces: Faces::Both, has_mixed, has_points: has_mixed }
     };
     let hull = plan.hull.as_ref().map(around);
     // Without pass masks nothing is peeled.

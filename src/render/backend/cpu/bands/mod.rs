@@ -223,7 +223,8 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
                 }
             }
             scratch.strokes.take_shares(pass.peak(), &mut scratch.whole);
-            // The light is that of the samples; any face will do where no stroke has named one.
+            // The light on both is that of the samples; where there are none, that of the face with the highest id whose
+            // edge is drawn there, hidden or not. Fringes name none.
             for (owner, _) in scratch.owners.iter_mut().zip(&scratch.whole).filter(|(_, share)| **share > 0.0) {
                 *owner = (*owner).max(1);
             }
@@ -454,7 +455,7 @@ fn edges_kernel(
     }
     drawer.marks = false;
     if parts == Drawn::Whole && context.plan.has_fringes_under(pass) {
-        for edge in bins.iter().flat_map(|chunk| chunk.wide.items_in(band)) {
+        for edge in bins.iter().flat_map(|chunk| chunk.unfringed.items_in(band)) {
             if is_late(&mut drawer) {
                 return;
             }

@@ -23,11 +23,11 @@ use crate::plan::Faces;
 pub struct TriangleBin {
     /// The chunk's ids.
     pub ids: Range<usize>,
-    /// Triangles that face the viewer and need no clipping; with boxes if pixels' points count.
+    /// Triangles that face the viewer and need no clipping; with boxes if the picture has mixed pixels.
     pub fronts: BandLists,
     /// Those that face away, with boxes.
     pub backs: BandLists,
-    /// Those of both that are thin, with boxes, if pixels' points count.
+    /// Those of both that are thin, with boxes, if the picture has mixed pixels.
     pub thin: BandLists,
     /// The sides that the chunk's triangles show.
     pub sides: Vec<Sides>,
@@ -43,7 +43,7 @@ impl TriangleBin {
     pub fn new(context: &RasterContext<'_>, [rows, margin]: [u32; 2], pass: &TrianglePass) -> Self {
         let plan = context.plan;
         let bands = plan.height_px.div_ceil(rows) as usize;
-        let bounds = Bounds::new(plan, [rows, margin], pass.has_points);
+        let bounds = Bounds::new(plan, [rows, margin], pass);
         let kept = keep(context, &bounds, pass);
         let mut bin = Self {
             ids: pass.ids.clone(),

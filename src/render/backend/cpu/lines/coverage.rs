@@ -10,7 +10,8 @@
 //! If strokes do not overlap, the coverage is the sum of their areas. If they overlap, the sum is scaled by the
 //! number of points that any stroke covers over the sum of the strokes' points. The result may differ from the
 //! union's points by at most four times that largest difference ([`LineCoverage::covered_share`]). Where
-//! [`holes`](super::holes) tell the coverage, there are no strokes.
+//! [`holes`](super::holes) tell the coverage, there are no strokes of visible parts. Where hidden parts fade, what whole
+//! edges cover beyond the visible parts counts a quarter.
 
 use super::holes::Holes;
 use super::stroke::{Amount, Mask, POINTS, WORDS, count};
@@ -339,7 +340,8 @@ fn composite_pixel(
         (None, Some(coverage)) => (coverage.covered_share(peak), &coverage.mask),
         (None, None) => (0.0, &NO_POINTS),
     };
-    // What hidden parts cover beside visible ones, which are fainter by a factor. Below 0 only by rounding.
+    // What hidden parts cover beside visible ones, times the share of the colour that they keep. Less than 0 where points
+    // miss some of the area that visible parts cover: no more is lost of it than that share.
     let hidden = covered.whole.get(i).map_or(0.0, |&whole| FADE * (whole - cover));
     let all = cover + hidden;
     if all > 0.0 {

@@ -3,13 +3,14 @@
 //!
 //! The fringe of a face is the part of it that is less than half a line's width from one of its sides. If all edges
 //! are lines, they cover the fringes of all faces, and beyond these only what lies beside rims, the edges at which the
-//! surface ends on screen or turns back: a way from another point to an edge within reach would leave the face over a
-//! side that is nearer. So the points of fringes and the strokes of rims are what the lines cover, and the strokes of
-//! most edges are not needed. It does not matter what hides what.
+//! surface ends on screen or turns back (docs/rasterizer.md, "Hidden parts that fade", says why). So the points of
+//! fringes and the strokes of rims are what the lines cover, and most edges need no stroke. It does not matter what
+//! hides what.
 //!
-//! Wide faces, and those that are clipped, have no fringes: few pixels of a wide face are in its fringe. All of their
-//! sides get strokes.
+//! Wide faces have no fringes, because few of their pixels would be in them, and neither have clipped faces and those
+//! seen edge-on. All of their sides get strokes.
 
+use super::holes::dig::padded;
 use super::holes::half_width;
 use super::holes::inset::{Inset, Insets};
 use super::stroke::{LATTICE, Mask, POINTS, PerPoint, WORDS, place, places_kernel, push};
@@ -92,9 +93,7 @@ fn fringes_kernel(
             if faces.iter().any(|&id| id as usize >= fringes.faces) {
                 continue;
             }
-            let mut ids = [faces[0]; LANES];
-            ids[..faces.len()].copy_from_slice(faces);
-            let insets = Insets::of(context, &ids, fringes.half, fringes.half_width);
+            let insets = Insets::of(context, &padded(faces), fringes.half, fringes.half_width);
             for l in 0..faces.len() {
                 fringes.add(&insets.get(l, fringes.half), strokes);
             }

@@ -57,6 +57,9 @@ pub const INTERVALS_MAX: u32 = 512;
 /// Units of work without end.
 pub const NO_LIMIT: u32 = u32::MAX;
 
+/// Faces per dispatch whose points a software device tests.
+const SOFTWARE_FACES: u32 = 1 << 14;
+
 /// Bytes before what paused workgroups remember: how many there are.
 pub const PROGRESS_HEAD_BYTES: u64 = 4;
 
@@ -215,10 +218,15 @@ impl Schedule {
         lined: Batch,
     ) -> Result<(), DrawError> {
         let Some(Pass { ids, faces, pass_bit, .. }) = Pass::of_visibility(plan)[0].clone() else { return Ok(()) };
-        for first in ids.clone().step_by(CHUNK as usize) {
-            let (count, pass_bit) = (CHUNK.min(ids.end - first), u32::from(pass_bit));
+        // Points take long: a software device would draw those of many faces in a dispatch that no deadline ends.
+        let many = if device.loops_are_limited && threads > 1 { SOFTWARE_FACES } else { CHUNK / threads };
+        for first in ids.clone().step_by(many as usize) {
+            let (count, pass_bit) = (many.min(ids.end - first), u32::from(pass_bit));
             let batch = Batch { first, count, faces: faces_code(faces), pass_bit, ..lined };
             self.dispatch(device, kernel, count * threads, batch)?;
+            if threads > 1 && count < ids.end - ids.start {
+                self.steps.push(Step::Submit);
+            }
         }
         Ok(())
     }

@@ -39,11 +39,11 @@ pub fn keep<V: Simd>(
         kept.sides.push(Sides {
             front: (lanes.front & whole) as u8,
             back: (lanes.back & whole) as u8,
-            wide: lanes.wide as u8,
+            unfringed: (lanes.wide | !(lanes.front | lanes.back)) as u8,
         });
         let (front, back) = (lanes.front & lanes.seen & drawn[0], lanes.back & lanes.seen & drawn[1]);
         if front != 0 {
-            if bounds.has_points {
+            if bounds.has_mixed {
                 lanes.put_boxed(simd, first, front, &mut kept.fronts);
             }
             lanes.put(simd, first, front, &mut kept.fronts);
@@ -52,7 +52,7 @@ pub fn keep<V: Simd>(
             lanes.put_boxed(simd, first, back, &mut kept.backs);
             lanes.put(simd, first, back, &mut kept.backs);
         }
-        if bounds.has_points && front | back != 0 {
+        if bounds.has_mixed && front | back != 0 {
             let thin = thin(&corners, front | back);
             if thin != 0 {
                 lanes.put_boxed(simd, first, thin, &mut kept.thin);

@@ -27,7 +27,9 @@ pub struct TrianglePass {
     pub pass_bit: u8,
     /// The faces that are drawn, where a triangle's pass mask does not say.
     pub faces: Faces,
-    /// True if all triangles count in which a pixel has one of its 256 points, as for mixed pixels and fringes.
+    /// True if mixed pixels are drawn from these triangles.
+    pub has_mixed: bool,
+    /// True if all triangles count in which a pixel has one of its 256 points: for mixed pixels, and for fringes.
     pub has_points: bool,
 }
 
@@ -72,8 +74,8 @@ impl TrianglePass {
 /// The rectangle of the picture that has samples, and its bands.
 pub struct Bounds {
     pub grid: SampleGrid,
-    /// As the pass has it. Thin triangles are listed then, and triangles that face the viewer have boxes.
-    pub has_points: bool,
+    /// True for mixed pixels. Thin triangles are listed then, and triangles that face the viewer have boxes.
+    pub has_mixed: bool,
     /// The picture's centre, 1/256 px from its corner.
     pub half: [i32; 2],
     /// Columns, and rows, that have samples.
@@ -87,11 +89,11 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Those of a plan's picture, for a pass from whose triangles mixed pixels are drawn or not.
-    pub fn new(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2], has_points: bool) -> Self {
+    /// Those of a plan's picture, for a pass.
+    pub fn new(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2], pass: &TrianglePass) -> Self {
         Self {
-            has_points,
-            grid: if has_points { POINT_GRID } else { SampleGrid::new(plan.samples) },
+            has_mixed: pass.has_mixed,
+            grid: if pass.has_points { POINT_GRID } else { SampleGrid::new(plan.samples) },
             half: [plan.width_px, plan.height_px].map(|size| size as i32 * 128),
             ranges: [plan.seen_range(plan.width_px), plan.seen_range(plan.height_px)],
             rows: rows as i32,
@@ -130,7 +132,7 @@ impl Bounds {
 
 /// Triangles of a chunk that culling leaves.
 pub struct Kept {
-    /// Triangles that face the viewer; with boxes if points count.
+    /// Triangles that face the viewer; with boxes if the picture has mixed pixels.
     pub fronts: KeptFaces,
     /// Triangles that face away, with boxes.
     pub backs: KeptFaces,
@@ -148,16 +150,15 @@ pub struct Kept {
 pub struct Sides {
     pub front: u8,
     pub back: u8,
-    /// A bit for each that is wider or higher than [`FRINGED_MAX`](crate::backend::cpu::lines::fringes::FRINGED_MAX),
-    /// or lies outside.
-    pub wide: u8,
+    /// A bit for each that has no fringe (see `lines/fringes`).
+    pub unfringed: u8,
 }
 
 impl Kept {
     /// Room for so many triangles.
     pub fn with_room_for(triangles: usize, bounds: &Bounds) -> Self {
         Self {
-            fronts: KeptFaces::with_room_for(triangles, bounds.has_points),
+            fronts: KeptFaces::with_room_for(triangles, bounds.has_mixed),
             backs: KeptFaces::with_room_for(triangles, true),
             thin: KeptFaces::default(),
             outside: Vec::new(),
@@ -211,7 +212,7 @@ mod tests {
                 let lane = Lane::new(&corners, l, bounds, depth_max);
                 sides.front |= u8::from(!lane.is_outside && lane.area < 0) << l;
                 sides.back |= u8::from(!lane.is_outside && lane.area > 0) << l;
-                sides.wide |= u8::from(lane.is_outside || lane.is_wide) << l;
+                sides.unfringed |= u8::from(lane.is_outside || lane.is_wide || lane.area == 0) << l;
                 let is_drawn = |k: usize| drawn[k] >> l & 1 != 0;
                 if lane.is_outside && (is_drawn(0) || is_drawn(1)) {
                     kept.outside.push(ids[l]);
@@ -219,7 +220,7 @@ mod tests {
                 if lane.is_seen && lane.area < 0 && is_drawn(0) {
                     kept.fronts.ids.push(ids[l]);
                     kept.fronts.spans.push(lane.span);
-                    if bounds.has_points {
+                    if bounds.has_mixed {
                         kept.fronts.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
                     }
                 }
@@ -264,7 +265,7 @@ mod tests {
             Self {
                 is_outside,
                 is_seen,
-                is_thin: bounds.has_points && is_thin(x, y, area),
+                is_thin: bounds.has_mixed && is_thin(x, y, area),
                 is_wide: [x, y]
                     .iter()
                     .any(|v| v.iter().max() > v.iter().min().map(|least| least + FRINGED_MAX).as_ref()),
@@ -277,7 +278,7 @@ mod tests {
 
     /// Triangles of all sizes, some of them behind the eye or far outside; those with a mask are
     /// drawn from one side, or not.
-    fn is_kept_alike(samples: u32, margin: u32, masks: Vec<u8>) -> [usize; 3] {
+    fn is_kept_alike(samples: u32, margin: u32, has_mixed: bool, masks: Vec<u8>) -> [usize; 3] {
         let mut state = 1_u32;
         let mut chance = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -299,9 +300,10 @@ mod tests {
             ids: 3..triangles.len(),
             pass_bit: pass_mask::SURFACE,
             faces: Faces::Both,
+            has_mixed,
             has_points: true,
         };
-        let bounds = Bounds::new(&plan, [17, margin], true);
+        let bounds = Bounds::new(&plan, [17, margin], &pass);
         let lists = |isa: Isa, keep: fn(&RasterContext<'_>, &Bounds, &TrianglePass) -> Kept| {
             let mut cpu = CpuRenderer::with_isa(1, isa);
             cpu.transform(&plan, None);
@@ -315,19 +317,19 @@ mod tests {
             assert!(lists(isa, keep) == want, "{samples} samples, margin {margin}, {isa:?}");
         }
         let (fronts, backs, outside, _, thin) = &want;
-        assert!(thin.0.len() > 10, "{}", thin.0.len());
+        assert!(if has_mixed { thin.0.len() > 10 } else { thin.0.is_empty() }, "{}", thin.0.len());
         [fronts.0.len(), backs.0.len(), outside.len()]
     }
 
     #[test]
     fn every_instruction_set_keeps_the_same() {
         for samples in [1, 4, 8, 16] {
-            for margin in [0, 5] {
-                let all = is_kept_alike(samples, margin, Vec::new());
+            for (margin, has_mixed) in [(0, true), (5, true), (5, false)] {
+                let all = is_kept_alike(samples, margin, has_mixed, Vec::new());
                 assert!(all.iter().all(|&count| count > 50), "{all:?}");
                 let drawn = |i: u32| if i.is_multiple_of(3) { 0 } else { pass_mask::SURFACE };
                 let mask = |i: u32| if i.is_multiple_of(5) { drawn(i) | pass_mask::BACK_ONLY } else { drawn(i) };
-                let some = is_kept_alike(samples, margin, (0..1499).map(mask).collect());
+                let some = is_kept_alike(samples, margin, has_mixed, (0..1499).map(mask).collect());
                 assert!((0..3).all(|k| some[k] > 20 && some[k] < all[k]), "{some:?} of {all:?}");
             }
         }

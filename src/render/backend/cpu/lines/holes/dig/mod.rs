@@ -145,8 +145,9 @@ struct Taken {
     len: usize,
 }
 
+/// Up to eight ids, of which the first is repeated after the last.
 #[inline(always)]
-fn padded(ids: &[u32]) -> [u32; LANES] {
+pub fn padded(ids: &[u32]) -> [u32; LANES] {
     let mut lanes = [ids.first().map_or(0, |&id| id); LANES];
     for (lane, &id) in lanes.iter_mut().zip(ids) {
         *lane = id;
