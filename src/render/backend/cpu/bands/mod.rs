@@ -446,21 +446,18 @@ fn edges_kernel(
         polls += 1;
         (polls % EDGES_PER_POLL == 1 || drawer.is_poll_due()) && context.deadline.check().is_err()
     };
-    drawer.marks = parts == Drawn::Visible;
-    for edge in bins.iter().flat_map(|chunk| chunk.rims.items_in(band)) {
+    let is_whole = parts == Drawn::Whole;
+    drawer.marks = !is_whole;
+    // One loop for both lists, because what it calls is copied into it.
+    let lists = bins.iter().flat_map(|chunk| [Some(&chunk.rims), Some(&chunk.unfringed).filter(|_| is_whole)]);
+    for edge in lists.flatten().flat_map(|list| list.items_in(band)) {
         if is_late(&mut drawer) {
             return;
         }
         drawer.draw(&pass.edges[edge as usize], target);
     }
     drawer.marks = false;
-    if parts == Drawn::Whole && context.plan.has_fringes_under(pass) {
-        for edge in bins.iter().flat_map(|chunk| chunk.unfringed.items_in(band)) {
-            if is_late(&mut drawer) {
-                return;
-            }
-            drawer.draw(&pass.edges[edge as usize], target);
-        }
+    if is_whole && context.plan.has_fringes_under(pass) {
         return;
     }
     // Most bands with holes need no other edges.

@@ -338,6 +338,7 @@ fn composite_pixel(
     let (cover, mask) = match (covered.holes.covered_share(i), covered.strokes.of(i)) {
         (Some(cover), _) => (cover, &NO_POINTS),
         (None, Some(coverage)) => (coverage.covered_share(peak), &coverage.mask),
+        (None, None) if covered.whole.is_empty() => return,
         (None, None) => (0.0, &NO_POINTS),
     };
     // What hidden parts cover beside visible ones, times the share of the colour that they keep. Less than 0 where points
