@@ -13,6 +13,7 @@ use meshsnap_server::config::{self, Config, SETTINGS};
 use meshsnap_server::durable::OpenError;
 use meshsnap_server::http;
 use meshsnap_server::http::ServeError;
+use meshsnap_server::shared_store;
 use meshsnap_server::telemetry;
 
 /// Arguments of `serve`.
@@ -65,7 +66,14 @@ pub fn run(arguments: &ServeArgs) -> Result<(), CliError> {
             CliError::usage(error.to_string())
         }
         ServeError::Data(OpenError::InUse(_)) => CliError::usage(error.to_string()),
-        ServeError::Listen { .. } | ServeError::Data(_) | ServeError::Start(_) => CliError::ours(error.to_string()),
+        ServeError::Shared(ref shared)
+            if !matches!(shared, shared_store::OpenError::HandOver(_) | shared_store::OpenError::DataFolder(_)) =>
+        {
+            CliError::usage(error.to_string())
+        }
+        ServeError::Listen { .. } | ServeError::Data(_) | ServeError::Shared(_) | ServeError::Start(_) => {
+            CliError::ours(error.to_string())
+        }
     })
 }
 

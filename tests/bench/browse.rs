@@ -6,8 +6,12 @@
 //!
 //!     cargo bench --bench browse                              # 200 meshes, 64 clients, 60 s, a quarter kept
 //!     cargo bench --bench browse -- --seconds 10 --style wire --backend gpu
+//!     cargo bench --bench browse -- --nodes 3 --seconds 20    # three servers with a shared store in a folder
+//!     cargo bench --bench browse -- --nodes 3 --store s3://BUCKET/PREFIX
 //!     cargo bench --bench browse -- --turning --mesh bunny.obj --seconds 5
 //!     cargo bench --bench browse -- --turning --mesh bunny.obj --style auto,flat,wire --clients 1
+//!
+//! With `--nodes` several servers share a store. The meshes are stored at the first, and each request goes to any of them.
 //!
 //! With `--turning` each request has a camera of its own, so that each picture is drawn, and none
 //! is compared. In turns with that, the PNG encoder alone is measured on all cores. `--style` takes
@@ -48,6 +52,10 @@ struct Options {
     style: String,
     backend: String,
     is_turning: bool,
+    /// Servers that are asked.
+    nodes: usize,
+    /// The store that they share; None: a folder that is made here.
+    store: Option<String>,
 }
 
 /// A request and the picture that it is to bring; None before it is known.
@@ -64,6 +72,7 @@ struct Seen {
     stages: BTreeMap<String, Vec<f64>>,
     hits: usize,
     coalesced: usize,
+    shared: usize,
     by_cpu: usize,
     wrong: usize,
     refused: usize,
@@ -95,28 +104,37 @@ fn browsing(options: &Options, meshes: &[Vec<u8>]) -> ExitCode {
     println!("needed: {} bytes of meshes, {} of pictures; a quarter of each is given", needed[0], needed[1]);
 
     let [resident, pictures] = needed.map(|bytes| (bytes / 4).to_string());
-    let caps = ["--mesh-bytes", "4GiB", "--resident-bytes", &resident, "--picture-bytes", &pictures];
-    let (mut child, address) = start_on(&options.backend, &caps.map(str::to_owned));
-    assert_eq!(self::views(options, &address, meshes).len(), views.len());
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = options.store.clone().unwrap_or_else(|| format!("file://{}", folder.path().display()));
+    let mut caps = vec!["--mesh-bytes", "4GiB", "--resident-bytes", &resident, "--picture-bytes", &pictures];
+    if options.nodes > 1 {
+        caps.extend(["--store", &store]);
+    }
+    let caps: Vec<String> = caps.into_iter().map(str::to_owned).collect();
+    let (mut children, addresses): (Vec<_>, Vec<_>) =
+        (0..options.nodes).map(|_| start_on(&options.backend, &caps)).unzip();
+    assert_eq!(self::views(options, &addresses[0], meshes).len(), views.len());
     let (is_over, samples, broken) = (AtomicBool::new(false), AtomicU64::new(0), AtomicU64::new(0));
     let mut memory_max = 0;
     let seen = std::thread::scope(|scope| {
         let clients: Vec<_> = (0..options.clients)
-            .map(|number| scope.spawn(client(options, &address, &views, number as u64, &is_over)))
+            .map(|number| scope.spawn(client(options, &addresses, &views, number as u64, &is_over)))
             .collect();
         let began = Instant::now();
         while began.elapsed().as_secs_f64() < options.seconds {
             std::thread::sleep(Duration::from_millis(100));
             samples.fetch_add(1, Ordering::Relaxed);
-            let is_kept = load(&address, "resident_mesh_bytes") <= needed[0] / 4
-                && load(&address, "kept_picture_bytes") <= needed[1] / 4;
-            broken.fetch_add(u64::from(!is_kept), Ordering::Relaxed);
-            memory_max = memory_max.max(resident_bytes(&child).unwrap_or(0));
+            let is_kept = |address: &String| {
+                load(address, "resident_mesh_bytes") <= needed[0] / 4
+                    && load(address, "kept_picture_bytes") <= needed[1] / 4
+            };
+            broken.fetch_add(u64::from(!addresses.iter().all(is_kept)), Ordering::Relaxed);
+            memory_max = children.iter().filter_map(resident_bytes).max().unwrap_or(0).max(memory_max);
         }
         is_over.store(true, Ordering::Relaxed);
         clients.into_iter().map(|client| client.join().expect("a client ends")).fold(Seen::default(), Seen::and)
     });
-    stop(&mut child);
+    children.iter_mut().for_each(stop);
     print(options, &seen, memory_max);
     println!("{:.0} answers a second", seen.times.len() as f64 / options.seconds);
     println!("caps: {} samples, {} above", samples.into_inner(), broken.load(Ordering::Relaxed));
@@ -126,6 +144,7 @@ fn browsing(options: &Options, meshes: &[Vec<u8>]) -> ExitCode {
 /// Draws pictures from ever new sides, in turns with the PNG encoder.
 fn turning(options: &Options, meshes: &[Vec<u8>]) -> ExitCode {
     let (mut child, address) = start_on(&options.backend, &["--picture-bytes".into(), "0".into()]);
+    let addresses = [address.clone()];
     let views = views(options, &address, meshes);
     let picture = image::load_from_memory(&get(&mut None, &address, &views[0].path).body).expect("a picture");
     let (width_px, height_px) = (picture.width(), picture.height());
@@ -138,7 +157,7 @@ fn turning(options: &Options, meshes: &[Vec<u8>]) -> ExitCode {
             let clients: Vec<_> = (0..options.clients)
                 .map(|number| {
                     let seed = u64::from(turn) << 32 | number as u64;
-                    scope.spawn(client(options, &address, &views, seed, &is_over))
+                    scope.spawn(client(options, &addresses, &views, seed, &is_over))
                 })
                 .collect();
             std::thread::sleep(Duration::from_secs_f64(options.seconds / f64::from(TURNS)));
@@ -164,14 +183,14 @@ fn turning(options: &Options, meshes: &[Vec<u8>]) -> ExitCode {
 /// One client, until it is over.
 fn client<'a>(
     options: &'a Options,
-    address: &'a str,
+    addresses: &'a [String],
     views: &'a [View],
     seed: u64,
     is_over: &'a AtomicBool,
 ) -> impl FnOnce() -> Seen + 'a {
     move || {
-        let (mut stream, mut seen, mut random) =
-            (None, Seen::default(), Random((seed + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15)));
+        let (mut seen, mut random) = (Seen::default(), Random((seed + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15)));
+        let mut streams: Vec<Option<TcpStream>> = addresses.iter().map(|_| None).collect();
         // The cumulative weights 1/1, 1/2, 1/3, ... of the meshes.
         let weights: Vec<f64> = (1..=views.len() / CAMERAS)
             .scan(0.0, |sum, rank| {
@@ -187,12 +206,14 @@ fn client<'a>(
             if options.is_turning {
                 let _ = write!(path, "&camera.azimuth_deg={:.6}", random.below_one() * 360.0 - 180.0);
             }
+            let node = (random.below_one() * addresses.len() as f64) as usize % addresses.len();
             let began = Instant::now();
-            let answer = get(&mut stream, address, &path);
+            let answer = get(&mut streams[node], &addresses[node], &path);
             seen.times.push(began.elapsed());
             seen.add_stages(&answer);
             seen.hits += usize::from(answer.header("x-cache") == Some("hit"));
             seen.coalesced += usize::from(answer.header("x-cache") == Some("coalesced"));
+            seen.shared += usize::from(answer.header("x-cache") == Some("shared"));
             seen.by_cpu += usize::from(answer.header("x-render-backend") == Some("cpu"));
             seen.refused += usize::from(answer.status != 200);
             // Two back-ends may draw a picture alike and not equal.
@@ -211,6 +232,7 @@ impl Seen {
         }
         self.hits += other.hits;
         self.coalesced += other.coalesced;
+        self.shared += other.shared;
         self.by_cpu += other.by_cpu;
         self.wrong += other.wrong;
         self.refused += other.refused;
@@ -233,7 +255,7 @@ fn print(options: &Options, seen: &Seen, memory_max: u64) {
     let at = |part: f64| times.get((times.len() as f64 * part) as usize).map_or(0.0, |t| t.as_secs_f64() * 1e3);
     let share = |count: usize| count as f64 / times.len().max(1) as f64;
     println!(
-        "{} px, {}, {}: {} answers, p50 {:.2} ms, p99 {:.2} ms, hits {:.3}, coalesced {:.3}, by the CPU {:.3}",
+        "{} px, {}, {}: {} answers, p50 {:.2} ms, p99 {:.2} ms, hits {:.3}, coalesced {:.3}, shared {:.3}, by the CPU {:.3}",
         options.size_px,
         options.style,
         options.backend,
@@ -242,6 +264,7 @@ fn print(options: &Options, seen: &Seen, memory_max: u64) {
         at(0.99),
         share(seen.hits),
         share(seen.coalesced),
+        share(seen.shared),
         share(seen.by_cpu),
     );
     let of_stage = |(name, times): (&String, &Vec<f64>)| {
@@ -343,6 +366,8 @@ fn options() -> Options {
         style: "flat".into(),
         backend: "cpu".into(),
         is_turning: false,
+        nodes: 1,
+        store: None,
     };
     let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
     while let Some(name) = arguments.next() {
@@ -358,6 +383,8 @@ fn options() -> Options {
             "--seconds" => options.seconds = value.parse().expect("seconds"),
             "--size" => options.size_px = value.parse().expect("pixels"),
             "--style" => options.style = value,
+            "--nodes" => options.nodes = value.parse().expect("a number"),
+            "--store" => options.store = Some(value),
             "--backend" => options.backend = value,
             other => panic!("there is no option {other}"),
         }

@@ -26,6 +26,8 @@ pub struct Config {
     pub listen: String,
     /// Folder for jobs, their results, and stored meshes.
     pub data_dir: Option<PathBuf>,
+    /// The address of the store that several servers share. None: this one is alone.
+    pub store: Option<String>,
     /// Stores nothing in a folder.
     pub ephemeral: bool,
     /// Folder for what makes the next start faster.
@@ -120,6 +122,7 @@ impl Default for Config {
         Self {
             listen: "127.0.0.1:8080".into(),
             data_dir: None,
+            store: None,
             ephemeral: false,
             cache_dir: None,
             workers: cores(),

@@ -50,6 +50,12 @@ pub const SETTINGS: &[Setting] = &[
         |c, v| set_folder(&mut c.data_dir, v),
         |c| show_folder(&c.data_dir),
     ),
+    text(
+        "store",
+        "Store of meshes and pictures that several servers share: s3://BUCKET/PREFIX, or file:///FOLDER",
+        set_store,
+        |c| c.store.clone().unwrap_or_default(),
+    ),
     switch("ephemeral", "Store nothing: jobs and meshes end with the process", |c| &mut c.ephemeral),
     text(
         "cache-dir",
@@ -274,6 +280,11 @@ fn set_listen(config: &mut Config, value: &str) -> Result<(), String> {
         ));
     }
     set(&mut config.listen, value)
+}
+
+fn set_store(config: &mut Config, value: &str) -> Result<(), String> {
+    config.store = Some(value.to_owned()).filter(|address| !address.is_empty());
+    Ok(())
 }
 
 fn set_folder(place: &mut Option<PathBuf>, value: &str) -> Result<(), String> {

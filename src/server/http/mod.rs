@@ -42,18 +42,23 @@ use std::time::Duration;
 use tokio::net::TcpListener;
 
 use crate::config::{Config, cores};
-use crate::durable::OpenError;
+use crate::durable::{OpenError, Recovered};
 use crate::keys::{Keys, KeysError};
+use crate::shared_store::{self, SharedStore};
 use crate::warm_up::WarmUp;
 use connection::accept::ConnectionLimits;
 use signals::{EndSignals, HangUps};
 use state::AppState;
+use stored_mesh::service::Shared;
 
 /// Time beyond a job's deadline after which the process ends without the jobs that still run.
 const DRAIN_GRACE: Duration = Duration::from_secs(5);
 
 /// Time that idle workers have to drop their renderers.
 const WORKERS_GRACE: Duration = Duration::from_secs(2);
+
+/// Time that threads of the runtime have to end.
+const RUNTIME_GRACE: Duration = Duration::from_secs(1);
 
 /// Reasons why the daemon did not start.
 #[derive(Debug, thiserror::Error)]
@@ -85,6 +90,9 @@ pub enum ServeError {
     /// The data folder cannot be used.
     #[error(transparent)]
     Data(#[from] OpenError),
+    /// The shared store cannot be used.
+    #[error(transparent)]
+    Shared(#[from] shared_store::OpenError),
     /// Threads or signal handlers could not be set up.
     #[error("the server could not start: {0}")]
     Start(#[from] std::io::Error),
@@ -99,7 +107,10 @@ pub fn serve(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
         .thread_name("http")
         .enable_all()
         .build()?;
-    runtime.block_on(run(config, ready))
+    let served = runtime.block_on(run(config, ready));
+    // A request to a store that does not answer may still wait for it.
+    runtime.shutdown_timeout(RUNTIME_GRACE);
+    served
 }
 
 async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), ServeError> {
@@ -117,9 +128,16 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     let mut signals = EndSignals::new()?;
     let hang_ups = HangUps::new()?;
 
-    let (state, recovered) = AppState::start(config, keys, address.ip().is_loopback())?;
+    let shared = tokio::select! {
+        shared = open_shared(config) => shared?,
+        () = signals.next() => return Ok(()),
+    };
+    let (state, recovered) = AppState::start(config, keys, shared, address.ip().is_loopback())?;
     tokio::spawn(reload_keys(hang_ups, state.clone()));
-    recovery::recover(&state, recovered);
+    let is_told_to_end = !take_over(&state, recovered, &mut signals).await?;
+    if is_told_to_end {
+        return Ok(());
+    }
     let router = router::router(&state);
     tracing::info!(%address, workers = config.workers, "ready");
     ready(address);
@@ -156,6 +174,39 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     }
     tracing::info!("ended");
     Ok(())
+}
+
+/// The shared store, once it answers. None: there is to be none.
+async fn open_shared(config: &Config) -> Result<Option<Shared>, shared_store::OpenError> {
+    let Some(address) = &config.store else { return Ok(None) };
+    let store = SharedStore::new(address)?;
+    store.reach().await?;
+    Ok(Some(Shared::new(store)))
+}
+
+/// Takes over what an earlier process has left. False if the server is told to end meanwhile.
+async fn take_over(
+    state: &Arc<AppState>,
+    mut recovered: Recovered,
+    signals: &mut EndSignals,
+) -> Result<bool, ServeError> {
+    if let Some(shared) = &state.shared {
+        let handed_over = tokio::select! {
+            handed_over = recovery::hand_over(state, shared, &mut recovered) => handed_over.map(|()| true),
+            () = signals.next() => Ok(false),
+        };
+        if !matches!(handed_over, Ok(true)) {
+            // Before `recovered` is dropped: what nothing names any more would be deleted.
+            if let Some(durable) = &state.durable {
+                durable.close();
+            }
+            return Ok(handed_over?);
+        }
+        let store = shared.store.clone();
+        tokio::spawn(async move { store.watch().await });
+    }
+    recovery::recover(state, recovered);
+    Ok(true)
 }
 
 /// Reads the file of API keys again with each SIGHUP. An error leaves the keys as they are.

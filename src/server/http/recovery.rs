@@ -9,13 +9,16 @@ use super::hear_of_ends;
 use super::receive::keys::Keys;
 use super::receive::{check, diff};
 use super::state::AppState;
-use super::stored_mesh;
-use crate::durable::{ClaimRecord, FileRecord, Hold, JobRecord, MeshRecord, Recovered, RecoveredJob, RequestKind};
+use super::stored_mesh::{self, service::Shared};
+use crate::durable::{
+    Change, ClaimRecord, FileRecord, Hold, JobRecord, MeshRecord, Recovered, RecoveredJob, RequestKind,
+};
 use crate::jobs::{
     Claim, ClaimName, Failure, JSON, JobId, JobState, Named, Newer, Owner, Recipe, Restored, Task, Work, read_picture,
     value_of,
 };
 use crate::memory::Account;
+use crate::shared_store::OpenError;
 use crate::store::{NewMesh, Reading};
 use meshsnap_render::import::{Bundle, BundleFile, Format};
 use meshsnap_render::request;
@@ -68,6 +71,26 @@ pub fn recover(state: &AppState, mut recovered: Recovered) {
     }
 }
 
+/// Puts the stored meshes of the data folder into the shared store, and removes them from the folder: where daemons share
+/// a store, it has all stored meshes. Each leaves the folder as soon as it is in the store.
+pub async fn hand_over(state: &AppState, shared: &Shared, recovered: &mut Recovered) -> Result<(), OpenError> {
+    let mut count = 0;
+    for record in std::mem::take(&mut recovered.meshes) {
+        let digest = record.digest;
+        if let Some((mesh, _)) = mesh_of(recovered, record) {
+            shared.store.put_mesh(&mesh).await?;
+            if let Some(durable) = &state.durable {
+                durable.store(vec![Change::MeshRemoved(digest)], Vec::new()).await?;
+            }
+            count += 1;
+        }
+    }
+    if count > 0 {
+        tracing::info!(meshes = count, "handed over to the shared store");
+    }
+    Ok(())
+}
+
 /// Tells the webhook of a job of its end, of which an earlier process has not told it.
 fn tell(state: &AppState, id: JobId, webhook: Option<&str>) {
     if let (Some(address), Some(job)) = (webhook, state.jobs.find(id)) {
@@ -76,10 +99,20 @@ fn tell(state: &AppState, id: JobId, webhook: Option<&str>) {
 }
 
 fn restore_mesh(state: &AppState, recovered: &Recovered, record: MeshRecord) {
+    let digest = record.digest;
+    let Some((mesh, holds)) = mesh_of(recovered, record) else { return };
+    if let Err(error) = state.meshes.insert(mesh, holds.into()) {
+        tracing::warn!(mesh = %digest, %error, "a stored mesh does not fit any more");
+    }
+}
+
+/// A stored mesh of the data folder, and its bytes there. None if they are lost.
+fn mesh_of(recovered: &Recovered, record: MeshRecord) -> Option<(NewMesh, Vec<Arc<Hold>>)> {
     let Some((files, mut holds)) = files(recovered, &record.files) else {
-        return tracing::warn!(mesh = %record.digest, "a stored mesh is lost: its file is missing or damaged");
+        tracing::warn!(mesh = %record.digest, "a stored mesh is lost: its file is missing or damaged");
+        return None;
     };
-    let Some((report, hold)) = recovered.bytes(record.report) else { return };
+    let (report, hold) = recovered.bytes(record.report)?;
     holds.push(hold);
     let reading = reading(record.format_in.as_deref(), record.entry.clone());
     let mesh = NewMesh {
@@ -89,9 +122,7 @@ fn restore_mesh(state: &AppState, recovered: &Recovered, record: MeshRecord) {
         report,
         owners: record.owners().map(|owner| Owner::new(owner)).collect(),
     };
-    if let Err(error) = state.meshes.insert(mesh, holds.into()) {
-        tracing::warn!(mesh = %record.digest, %error, "a stored mesh does not fit any more");
-    }
+    Some((mesh, holds))
 }
 
 fn restore_result(state: &AppState, recovered: &Recovered, name: Restored, job: RecoveredJob) {

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use super::event_streams::EventStreams;
 use super::static_document::StaticDocument;
+use super::stored_mesh::service::Shared;
 use super::{ServeError, descriptions, error, hear_of_ends};
 use crate::config::{Config, cores, memory_bytes, why_no_gpu};
 use crate::durable::{Durable, Recovered};
@@ -45,6 +46,8 @@ pub struct AppState {
     pub metrics: Arc<Metrics>,
     /// The data folder. None: nothing outlives the process.
     pub durable: Option<Durable>,
+    /// The store that several daemons share. None: this one is alone.
+    pub shared: Option<Shared>,
     /// The webhooks. None: there is no secret for them.
     pub webhooks: Option<Webhooks>,
     /// The clients that follow jobs.
@@ -81,7 +84,12 @@ pub struct AppState {
 
 impl AppState {
     /// Builds the state and starts the workers. Returns what is in the data folder as well.
-    pub fn start(config: &Config, keys: Keys, is_local: bool) -> Result<(Arc<Self>, Recovered), ServeError> {
+    pub fn start(
+        config: &Config,
+        keys: Keys,
+        shared: Option<Shared>,
+        is_local: bool,
+    ) -> Result<(Arc<Self>, Recovered), ServeError> {
         let (durable, recovered) = match &config.data_dir {
             Some(folder) if !config.ephemeral => {
                 let (durable, recovered) = Durable::open(folder)?;
@@ -123,8 +131,14 @@ impl AppState {
             rules,
             jobs: Jobs::start(settings, renderers)?,
             gpu,
-            meshes: Store::new(durable.clone(), memory.clone(), to_usize(config.mesh_count)),
+            // With a shared store, the one in memory is a cache of it, and the data folder has jobs alone.
+            meshes: Store::new(
+                durable.clone().filter(|_| shared.is_none()),
+                memory.clone(),
+                to_usize(config.mesh_count),
+            ),
             durable,
+            shared,
             webhooks,
             event_streams: EventStreams::new(),
             metrics,

@@ -32,7 +32,7 @@ pub use job::{
     Checking, Comparing, Failure, Finished, Job, JobId, JobState, Media, Newer, Product, Recipe, Task, Timings, Work,
 };
 pub use progress::{Progress, Step};
-pub use storage::{JSON, Storage, name, read_picture, value_of};
+pub use storage::{JSON, Storage, name, picture_record, read_picture, value_of};
 pub use worker::{CpuThreads, Renderer, RendererFactory, pipeline_renderers};
 
 use std::sync::{Arc, Mutex, PoisonError};

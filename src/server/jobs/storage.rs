@@ -8,6 +8,7 @@ use std::time::Duration;
 use bytes::Bytes;
 
 use super::job::{Failure, Finished, Job, JobState, Media, Newer, Task, Timings, Work, unix_ms};
+use crate::digest::Digest;
 use crate::durable::{
     ClaimRecord, Durable, EndRecord, ErrorRecord, FileRecord, Hold, JobRecord, PictureRecord, RequestKind,
     RequestRecord, SelectionRecord, SideRecord, Unstored, WarningRecord,
@@ -117,7 +118,7 @@ impl Storage {
         match state {
             JobState::Done(finished) => {
                 let hold = self.durable.hold(&finished.content)?;
-                end.picture = Some(of_picture(finished, &hold));
+                end.picture = Some(picture_record(finished, hold.digest()));
                 holds.push(hold);
             }
             JobState::Failed(failure) => end.error = Some((self.describe)(failure)),
@@ -127,7 +128,8 @@ impl Storage {
     }
 }
 
-fn of_picture(finished: &Finished, hold: &Hold) -> PictureRecord {
+/// The record of a picture or a verdict whose bytes have this digest.
+pub fn picture_record(finished: &Finished, digest: Digest) -> PictureRecord {
     let warnings = finished.warnings.iter();
     let selection = finished.selection.as_ref().map(|selection| SelectionRecord {
         samples: match selection.samples {
@@ -141,7 +143,7 @@ fn of_picture(finished: &Finished, hold: &Hold) -> PictureRecord {
         expected_time_ms: selection.expected_time_ms,
     });
     PictureRecord {
-        digest: hold.digest(),
+        digest,
         format: match finished.media {
             Media::Picture(format) => word_for(format).to_owned(),
             Media::Json => JSON.to_owned(),

@@ -55,6 +55,8 @@ pub enum Source {
     Miss,
     /// It was drawn for another request, for which this one waited.
     Coalesced,
+    /// It was in the store that several daemons share.
+    Shared,
 }
 
 /// The content of [`Pictures`] at one moment.
@@ -102,35 +104,36 @@ impl Pictures {
         Self { cache, drawing: Mutex::default(), bytes }
     }
 
-    /// The picture of this key, drawn by `draw` if it is not in memory. Requests for the same picture
+    /// The picture of this key, from `make` if it is not in memory. Requests for the same picture
     /// wait for the first. If that one fails or its client hangs up, each of the others draws for itself:
     /// none waits longer than for one drawing.
     pub async fn find<E>(
         &self,
         key: &str,
-        draw: impl Future<Output = Result<Arc<Finished>, E>>,
+        make: impl Future<Output = Result<(Arc<Finished>, Source), E>>,
     ) -> Result<FoundPicture, E> {
-        let drawn = match self.join(key) {
-            Joined::Kept(kept) => return Ok(kept.found(Source::Hit)),
+        match self.join(key) {
+            Joined::Kept(kept) => Ok(kept.found(Source::Hit)),
             Joined::Second(mut first) => {
                 if let Ok(kept) = first.wait_for(Option::is_some).await
                     && let Some(kept) = kept.as_ref()
                 {
                     return Ok(kept.found(Source::Coalesced));
                 }
-                Kept::new(draw.await?)
+                let (finished, source) = make.await?;
+                Ok(Kept::new(finished).found(source))
             }
             Joined::First(first) => {
-                let mut kept = Kept::new(draw.await?);
+                let (finished, source) = make.await?;
+                let mut kept = Kept::new(finished);
                 // Another picture is due when the GPU is back.
                 if !kept.finished.is_substitute {
                     kept.memory = kept.finished.kept_on(Account::Pictures).map(Arc::new);
                     self.cache.insert(key.to_owned(), kept.clone());
                 }
-                first.tell(kept)
+                Ok(first.tell(kept).found(source))
             }
-        };
-        Ok(drawn.found(Source::Miss))
+        }
     }
 
     fn join<'a>(&'a self, key: &'a str) -> Joined<'a> {
@@ -176,6 +179,7 @@ impl Source {
             Self::Hit => "hit",
             Self::Miss => "miss",
             Self::Coalesced => "coalesced",
+            Self::Shared => "shared",
         }
     }
 }

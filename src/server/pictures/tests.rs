@@ -38,7 +38,7 @@ async fn the_others_draw_for_themselves_where_the_first_fails_or_hangs_up() {
         .map(|i| {
             let pictures = pictures.clone();
             tokio::spawn(async move {
-                let drawn = if i == 1 { Err("no paint") } else { Ok(picture(10)) };
+                let drawn = if i == 1 { Err("no paint") } else { Ok((picture(10), Source::Miss)) };
                 pictures.find("a", async { drawn }).await.map(|found| found.source)
             })
         })
@@ -52,7 +52,7 @@ async fn the_others_draw_for_themselves_where_the_first_fails_or_hangs_up() {
     assert_eq!(sources, [Ok(Source::Miss), Err("no paint"), Ok(Source::Miss)]);
     // Nothing is left of them: the next one is the first again.
     assert!(pictures.locked().is_empty());
-    let found = pictures.find("a", async { Ok::<_, ()>(picture(10)) }).await.unwrap();
+    let found = pictures.find("a", async { Ok::<_, ()>((picture(10), Source::Miss)) }).await.unwrap();
     assert_eq!(found.source, Source::Miss);
     let again = pictures.find("a", async { Err(()) }).await.unwrap();
     assert_eq!((again.source, again.finished.content.len()), (Source::Hit, 10));
@@ -67,7 +67,7 @@ async fn those_who_wait_get_the_first_ones_picture() {
         async move {
             let draw = async {
                 dries.await.unwrap();
-                Ok::<_, ()>(picture(10))
+                Ok::<_, ()>((picture(10), Source::Miss))
             };
             pictures.find("a", draw).await
         }
@@ -90,7 +90,7 @@ async fn a_picture_in_place_of_a_gpus_is_not_kept() {
     for is_substitute in [true, true, false] {
         let mut drawn = picture(10);
         Arc::get_mut(&mut drawn).unwrap().is_substitute = is_substitute;
-        let found = pictures.find("W/a", async { Ok::<_, ()>(drawn) }).await.unwrap();
+        let found = pictures.find("W/a", async { Ok::<_, ()>((drawn, Source::Miss)) }).await.unwrap();
         assert_eq!(found.source, Source::Miss, "{is_substitute}");
     }
     // The CPU drew this one because it was quicker.
@@ -105,11 +105,11 @@ async fn what_is_too_large_is_drawn_and_not_kept() {
     for _ in 0..2 {
         let draw = async {
             drawn.fetch_add(1, Ordering::Relaxed);
-            Ok::<_, ()>(picture(20_000))
+            Ok::<_, ()>((picture(20_000), Source::Miss))
         };
         assert_eq!(pictures.find("a", draw).await.unwrap().source, Source::Miss);
         for i in 0..40 {
-            pictures.find(&i.to_string(), async { Ok::<_, ()>(picture(500)) }).await.unwrap();
+            pictures.find(&i.to_string(), async { Ok::<_, ()>((picture(500), Source::Miss)) }).await.unwrap();
             assert!(pictures.load().bytes <= 10_000, "{:?}", pictures.load());
         }
     }

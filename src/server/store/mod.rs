@@ -228,7 +228,7 @@ impl Store {
 
 impl NewMesh {
     /// The memory of its files, their names, its report, and the entry's name.
-    fn size_bytes(&self) -> u64 {
+    pub fn size_bytes(&self) -> u64 {
         let names = self.bundle.files().iter().map(|file| file.path.len());
         let entry = self.reading.entry.as_ref().map_or(0, String::len);
         self.bundle.bytes_len() + (names.sum::<usize>() + entry + self.report.len()) as u64

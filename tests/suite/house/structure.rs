@@ -92,6 +92,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("server/residents", &["server/cache", "server/memory"]),
     ("server/pictures", &["server/cache", "server/memory", "server/jobs"]),
     ("server/store", &["server/jobs", "server/keys", "server/memory", "server/durable", "server/digest"]),
+    ("server/shared_store", &["server/store", "server/jobs", "server/keys", "server/durable", "server/digest"]),
     ("server/webhooks", &["server/metrics"]),
     ("server/warm_up", &[]),
     (
@@ -106,6 +107,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "server/signature",
             "server/metrics",
             "server/store",
+            "server/shared_store",
             "server/durable",
             "server/digest",
             "server/jobs",
@@ -191,7 +193,7 @@ const ONLY_UNDER: &[(&str, &[&str])] = &[
     ("sha2::", &["server/digest", "server/signature", "server/webhooks"]),
     ("redb::", &["server/durable/"]),
     ("prometheus::", &["server/metrics"]),
-    ("object_store::", &["server/durable/"]),
+    ("object_store::", &["server/durable/", "server/shared_store/"]),
     ("quick_cache::", &["server/cache", "server/residents", "server/jobs/estimates"]),
     ("rustix::", &["program/sandbox/", "server/priority"]),
     ("landlock::", &["program/sandbox/"]),
@@ -204,6 +206,7 @@ const ONLY_UNDER: &[(&str, &[&str])] = &[
             "server/config",
             "server/http/",
             "server/durable/",
+            "server/shared_store/",
             "server/keys/",
             "render/backend/gpu/pipelines/file.rs",
             // Counts the process's threads.

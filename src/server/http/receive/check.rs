@@ -58,7 +58,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     };
     let (work, digest) = if let Some(document) = document_of(&upload, &reading, &headers) {
         let [digest] = keys.add_document(document, &KEYS, ["mesh"])?;
-        let stored = stored_mesh::find(state, Some(&digest.to_string()), &sender.access)?;
+        let stored = stored_mesh::find(state, Some(&digest.to_string()), &sender.access).await?;
         let recipe = Recipe { document: None, overrides: keys.pairs().into(), mesh: Some(digest) };
         let work = stored_mesh::work_on(&stored, reading.clone(), task(&keys, digest)?);
         (Work { recipe: Some(Arc::new(recipe)), ..work }, digest)

@@ -67,7 +67,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     let (least_rate, memory) = (state.least_rate, &state.memory);
     let limits = BodyLimits { bytes, files, meshes: None, time, least_rate, memory };
     let meshes = match sides::read(request, limits).await? {
-        sides::Sides::Document(document) => stored(state, &document, &mut keys, &reading, &sender.access)?,
+        sides::Sides::Document(document) => stored(state, &document, &mut keys, &reading, &sender.access).await?,
         sides::Sides::Meshes { bundles, reservations } => sent(bundles, reservations, &reading).await?,
     };
     let answer = Answer::of(state, &keys, form_of_answer(&keys, &headers)?)?;
@@ -86,7 +86,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
 }
 
 /// The stored meshes that a document names.
-fn stored(
+async fn stored(
     state: &AppState,
     document: &Bytes,
     keys: &mut Keys,
@@ -94,8 +94,8 @@ fn stored(
     access: &Access,
 ) -> Result<Meshes, ApiError> {
     let digests = keys.add_document(document, &KEYS, sides::PARTS)?;
-    let find = |digest: Digest| stored_mesh::find(state, Some(&digest.to_string()), access);
-    let (a, b) = (find(digests[0])?, find(digests[1])?);
+    let [a, b] = digests.map(|digest| digest.to_string());
+    let (a, b) = (stored_mesh::find(state, Some(&a), access).await?, stored_mesh::find(state, Some(&b), access).await?);
     let bundle = b.mesh.bundle.clone().with_entry(reading.entry.clone());
     let newer = Newer { bundle, memory: b.memory.clone(), holds: b.holds.clone(), mesh: Some(digests[1]) };
     let work = stored_mesh::work_on(&a, reading.clone(), Task::Inspect { time_s: None });

@@ -90,13 +90,14 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
         },
         None => None,
     };
-    let Received { work, key, address, is_negotiated } = understand(state, query, upload, &headers, &sender.access)?;
+    let Received { work, key, address, is_negotiated } =
+        understand(state, query, upload, &headers, &sender.access).await?;
     let work = sender.sign(work, claim);
     Ok(Reception::New(Box::new(Received { work, key, address, is_negotiated })))
 }
 
 /// Reads the document of a request, and finds the mesh that it names.
-fn understand(
+async fn understand(
     state: &AppState,
     query: Query,
     upload: Upload,
@@ -115,7 +116,7 @@ fn understand(
         let (name, spec) = request::read_with_mesh(document, &overrides, &state.rules)?;
         let digest = Digest::parse(&name).ok_or_else(|| request::bad_mesh_name(&name))?;
         let spec = with_format(spec)?;
-        let stored = stored_mesh::find(state, Some(&name), access)?;
+        let stored = stored_mesh::find(state, Some(&name), access).await?;
         let key = Some(render_key(state, digest, &reading, &spec));
         let keys = request::all_dotted(document, &overrides, &spec, &state.rules);
         let address = keys.and_then(|keys| Address::new(state, digest, &reading, &spec, &keys));

@@ -11,6 +11,7 @@ use crate::durable::Durable;
 use crate::http::dto::{CapabilitiesDto, DifficultyDto, StatusDto, VersionDto};
 use crate::http::error::{ApiError, ErrorKind};
 use crate::http::state::AppState;
+use crate::http::stored_mesh::shared;
 
 /// 200 while the process is alive.
 pub async fn healthz() -> Response {
@@ -21,6 +22,9 @@ pub async fn healthz() -> Response {
 pub async fn readyz(State(state): State<Arc<AppState>>) -> Result<Response, ApiError> {
     if state.is_leaving() {
         return Err(ApiError::draining("the server is shutting down"));
+    }
+    if state.shared.as_ref().is_some_and(|shared| shared.store.is_in_trouble()) {
+        return Err(shared::unavailable());
     }
     let load = state.jobs.load();
     let detail = format!("{} workers do not end jobs whose time is up", load.overdue);

@@ -21,7 +21,7 @@ use crate::http::receive::query::Query;
 use crate::http::receive::upload::{self, NamedUpload};
 use crate::http::receive::{self, body};
 use crate::http::state::AppState;
-use crate::http::stored_mesh;
+use crate::http::stored_mesh::{self, shared};
 use crate::jobs::{Class, Owner, Task, Work};
 use crate::keys::Access;
 use crate::store::{NewMesh, Reading, Removed};
@@ -47,7 +47,7 @@ pub async fn get(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let (reading, time_s) = Query::read_for_report(&uri, &state.rules)?;
-    let stored = stored_mesh::find(&state, text_of(id).as_deref(), &access)?;
+    let stored = stored_mesh::find(&state, text_of(id).as_deref(), &access).await?;
     let tag = report_tag(stored.mesh.digest, &reading, time_s);
     let cached = [conditional::etag(&tag), conditional::cache_for_a_day(!access.is_open())];
     if conditional::is_known(&headers, &tag) {
@@ -72,12 +72,12 @@ pub async fn delete(
     id: PathName,
 ) -> Result<Response, ApiError> {
     let digest = stored_mesh::digest(text_of(id).as_deref())?;
-    match state.meshes.remove(digest, &access) {
-        Removed::Gone => {
-            state.residents.forget(&digest.to_string());
-            Ok(StatusCode::NO_CONTENT.into_response())
-        }
-        Removed::OfOthers => Ok(StatusCode::NO_CONTENT.into_response()),
+    let removed = match &state.shared {
+        Some(shared) => shared::delete_mesh(&state, shared, digest, &access).await?,
+        None => stored_mesh::remove(&state, digest, &access),
+    };
+    match removed {
+        Removed::Gone | Removed::OfOthers => Ok(StatusCode::NO_CONTENT.into_response()),
         Removed::Unknown => Err(stored_mesh::unknown()),
     }
 }
@@ -100,15 +100,24 @@ async fn store(state: &AppState, request: Request, wanted: Option<Digest>) -> Re
     state.meshes.check_size(bundle.bytes_len())?;
     let body = MeshDto::new(digest, &bundle);
     // A mesh that was read in this way before need not be read again.
-    let is_known = state.meshes.find(digest, &access).is_some_and(|stored| stored.mesh.reading == reading);
+    let known = state.meshes.find(digest, &access).filter(|stored| stored.mesh.reading == reading);
+    // Where servers share a store, another one may have deleted it.
+    let is_known = known.is_some() && state.shared.is_none();
     let is_new = !is_known && {
         let task = Task::Inspect { time_s: None };
         let read = stored_mesh::work(bundle.clone(), reading.clone(), task, memory.clone());
         let work = Work { owner: access.owner.clone(), ..read };
-        let report = run::inspect(state, work).await?;
+        let report = match known {
+            Some(known) => known.mesh.report.clone(),
+            None => run::inspect(state, work).await?,
+        };
         // Addresses are no identity: without keys, a mesh is everybody's.
-        let owners = vec![if access.is_open() { Owner::default() } else { access.owner }];
-        insert(state, NewMesh { digest, bundle, reading, report, owners }).await?
+        let owners = vec![if access.is_open() { Owner::default() } else { access.owner.clone() }];
+        let mesh = NewMesh { digest, bundle, reading, report, owners };
+        match &state.shared {
+            Some(shared) => shared::store_mesh(state, shared, mesh, &access).await?,
+            None => insert(state, mesh).await?,
+        }
     };
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
     let headers = [

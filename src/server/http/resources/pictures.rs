@@ -14,7 +14,7 @@ use crate::http::dto::media_type;
 use crate::http::error::ApiError;
 use crate::http::receive::query::{Query, query_error};
 use crate::http::state::AppState;
-use crate::http::stored_mesh;
+use crate::http::stored_mesh::{self, shared};
 use crate::jobs::{Media, Task, Work};
 use crate::keys::Access;
 use meshsnap_render::image::ImageFormat;
@@ -37,7 +37,7 @@ pub async fn get(
     let mut spec = request::read(None, &overrides, &state.rules).map_err(query_error)?;
     request::set_format(&mut spec, format);
 
-    let stored = stored_mesh::find(&state, path.as_ref().map(|(id, _)| id.as_str()), &access)?;
+    let stored = stored_mesh::find(&state, path.as_ref().map(|(id, _)| id.as_str()), &access).await?;
     let tag = render_key(&state, stored.mesh.digest, &reading, &spec);
     let cached = [conditional::etag(&tag), conditional::cache_for_a_day(!access.is_open())];
     if conditional::is_known(&headers, &tag) {
@@ -48,11 +48,11 @@ pub async fn get(
         ([(header::CONTENT_TYPE, media_type)], responses::body_of_unknown_length()).into_response()
     } else {
         // No work is made for a picture that is in memory.
-        let drawing = async {
+        let drawing = shared::picture(&state, (stored.mesh.digest, &tag), async {
             let work =
                 Work { owner: access.owner, ..stored_mesh::work_on(&stored, reading, Task::Draw(Box::new(spec))) };
             run::draw(&state, work).await
-        };
+        });
         let found = state.pictures.find(&tag, drawing).await?;
         state.metrics.picture(found.source.name());
         responses::found(&found, Some(&tag))

@@ -12,6 +12,7 @@ use crate::http::error::ApiError;
 use crate::http::negotiate;
 use crate::http::receive::{self, Received, Reception};
 use crate::http::state::AppState;
+use crate::http::stored_mesh::shared;
 use crate::jobs::{Class, Job};
 
 /// Draws while the client waits. With `Prefer: respond-async`, accepts a job instead.
@@ -27,11 +28,12 @@ pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Resul
     if respond_async {
         return Ok(accepted(&*state.jobs.accept(work).await?));
     }
+    let mesh = work.recipe.as_ref().and_then(|recipe| recipe.mesh);
     let drawing = run::draw(&state, work);
-    let mut response = match key {
-        Some(key) => {
+    let mut response = match key.zip(mesh) {
+        Some((key, mesh)) => {
             let tag = address.as_ref().map(|at| at.etag.as_str());
-            let found = state.pictures.find(&key, drawing).await?;
+            let found = state.pictures.find(&key, shared::picture(&state, (mesh, &key), drawing)).await?;
             state.metrics.picture(found.source.name());
             responses::found(&found, tag)
         }

@@ -10,12 +10,14 @@ use super::{responses, run};
 use crate::http::error::ApiError;
 use crate::http::receive::check::Asked;
 use crate::http::state::AppState;
+use crate::pictures::Source;
 
 /// The answer to a request that a client waits for.
 async fn answer(state: &AppState, asked: Asked) -> Result<Response, ApiError> {
     match asked {
         Asked::New { work, key } => {
-            let found = state.pictures.find(&key, run::draw(state, *work)).await?;
+            let judging = async { Ok::<_, ApiError>((run::draw(state, *work).await?, Source::Miss)) };
+            let found = state.pictures.find(&key, judging).await?;
             state.metrics.picture(found.source.name());
             Ok(responses::found(&found, Some(&key)))
         }

@@ -1,5 +1,9 @@
 //! Stored meshes, as the handlers use them: finds one by its digest, and makes the work of a job on
-//! it, or on an upload.
+//! it, or on an upload. Where daemons share a
+//! store, [`shared`] does this; [`service`] has its state.
+
+pub mod service;
+pub mod shared;
 
 use std::sync::Arc;
 
@@ -9,12 +13,25 @@ use crate::digest::Digest;
 use crate::jobs::{Owner, Task, Work};
 use crate::keys::Access;
 use crate::memory::MemoryShare;
-use crate::store::{Reading, StoredMesh};
+use crate::store::{Reading, Removed, StoredMesh};
 use meshsnap_render::import::Bundle;
 
 /// The stored mesh with this name, if the sender sees it. None is a path segment that is not text.
-pub fn find(state: &AppState, name: Option<&str>, access: &Access) -> Result<Arc<StoredMesh>, ApiError> {
-    state.meshes.find(digest(name)?, access).ok_or_else(unknown)
+pub async fn find(state: &AppState, name: Option<&str>, access: &Access) -> Result<Arc<StoredMesh>, ApiError> {
+    let digest = digest(name)?;
+    match &state.shared {
+        Some(shared) => shared::find_mesh(state, shared, digest, access).await,
+        None => state.meshes.find(digest, access).ok_or_else(unknown),
+    }
+}
+
+/// Removes what a party has of a mesh from this process, and from its data folder.
+pub fn remove(state: &AppState, digest: Digest, access: &Access) -> Removed {
+    let removed = state.meshes.remove(digest, access);
+    if removed == Removed::Gone {
+        state.residents.forget(&digest.to_string());
+    }
+    removed
 }
 
 /// The digest that a path segment names.
