@@ -181,6 +181,7 @@ async fn open_shared(config: &Config) -> Result<Option<Shared>, shared_store::Op
     let Some(address) = &config.store else { return Ok(None) };
     let store = SharedStore::new(address)?;
     store.reach().await?;
+    tracing::info!(address, "the shared store answers");
     Ok(Some(Shared::new(store)))
 }
 

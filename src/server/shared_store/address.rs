@@ -30,10 +30,13 @@ pub enum AddressError {
     Absent,
 }
 
+/// The beginning of the address of a folder.
+pub const FOLDER_SCHEME: &str = "file://";
+
 /// The store at an address. Paths of objects are relative to it.
 pub fn open(address: &str) -> Result<Arc<dyn ObjectStore>, AddressError> {
     let form = || AddressError::Form(address.to_owned());
-    if let Some(folder) = address.strip_prefix("file://") {
+    if let Some(folder) = address.strip_prefix(FOLDER_SCHEME) {
         return if folder.starts_with('/') { open_folder(folder) } else { Err(form()) };
     }
     let place = address.strip_prefix("s3://").ok_or_else(form)?;
@@ -55,7 +58,7 @@ fn open_folder(folder: &str) -> Result<Arc<dyn ObjectStore>, AddressError> {
 
 #[cfg(feature = "cluster")]
 fn open_bucket(bucket: &str, prefix: &str) -> Result<Arc<dyn ObjectStore>, AddressError> {
-    super::s3::open(bucket, prefix).map_err(|error| AddressError::Bucket(error.to_string()))
+    super::s3::open(bucket, prefix).map_err(AddressError::Bucket)
 }
 
 #[cfg(not(feature = "cluster"))]

@@ -10,6 +10,7 @@
 //! - `pictures/SHA-256/KEY`: a picture of that mesh under its render key, which is a digest of all that decides the
 //!   picture. Two daemons that draw the same picture write the same object. Nothing depends on these objects: they may
 //!   be deleted at any time.
+//! - `meshsnap`: marks the store as one. Each server writes it at its start, and looks from time to time whether it is there.
 //!
 //! [`objects`] has the form of the objects. [`s3`] opens a bucket.
 //!
@@ -57,6 +58,8 @@ const ATTEMPT_EVERY_MAX: Duration = Duration::from_secs(10);
 #[derive(Debug)]
 pub struct SharedStore {
     objects: Arc<dyn ObjectStore>,
+    /// True for a folder, false for a bucket.
+    is_folder: bool,
     /// Its address, for messages.
     address: String,
     /// What the last look, or an operation since, has met; None: the store can be reached.
@@ -77,8 +80,8 @@ pub enum OpenError {
     /// The address has the wrong form.
     #[error(transparent)]
     Address(#[from] AddressError),
-    /// It refuses these credentials.
-    #[error("the shared store {address} refuses the credentials of this server: {cause}")]
+    /// This server may not write to it.
+    #[error("the shared store {address} refuses the credentials or the rights of this server: {cause}")]
     Refused {
         /// The address.
         address: String,
@@ -112,7 +115,9 @@ pub struct FoundMesh {
 impl SharedStore {
     /// The store at an address: `s3://BUCKET/PREFIX` or `file:///FOLDER`. Nothing is read yet.
     pub fn new(address: &str) -> Result<Self, AddressError> {
-        Ok(Self { objects: address::open(address)?, address: address.to_owned(), trouble: Mutex::default() })
+        let (objects, address) = (address::open(address)?, address.to_owned());
+        let is_folder = address.starts_with(address::FOLDER_SCHEME);
+        Ok(Self { objects, is_folder, address, trouble: Mutex::default() })
     }
 
     /// Marks the store as one, and returns once that is done. While it cannot be reached, tries again; the log says so.
@@ -126,6 +131,7 @@ impl SharedStore {
                     return Err(OpenError::Refused { address, cause: words });
                 }
                 object_store::Error::NotFound { .. } => return Err(OpenError::Missing { address, cause: words }),
+                _ if is_forbidden(&cause) => return Err(OpenError::Refused { address, cause: words }),
                 _ => tracing::warn!(address, cause = words, "waiting for the shared store"),
             }
             tokio::time::sleep(pause).await;
@@ -157,6 +163,7 @@ impl SharedStore {
 
     /// Stores a mesh for its owners. It is there as a whole, and durably, once this returns.
     pub async fn put_mesh(&self, mesh: &NewMesh) -> Result<(), Unavailable> {
+        self.is_there().await?;
         for owner in &mesh.owners {
             let object = objects::of_mesh(mesh, owner);
             self.objects
@@ -200,6 +207,7 @@ impl SharedStore {
 
     /// Stores a picture of a stored mesh under its render key.
     pub async fn put_picture(&self, mesh: Digest, key: &str, picture: &Finished) -> Result<(), Unavailable> {
+        self.is_there().await?;
         let object = objects::of_picture(picture);
         self.objects.put(&place_of_picture(mesh, key), object).await.map(drop).map_err(|cause| self.unavailable(cause))
     }
@@ -257,11 +265,25 @@ impl SharedStore {
         self.objects.put(&Path::from(MARK), MARK_TEXT.into()).await.map(drop)
     }
 
-    /// Reads the mark. It is missing where a folder is not mounted any more.
+    /// Reads the mark. Where a folder is not mounted any more, it is missing. In a bucket it is written again, because a rule
+    /// may have removed it.
     async fn look(&self) -> object_store::Result<()> {
         let mark = Path::from(MARK);
-        let looking = self.objects.get(&mark);
-        tokio::time::timeout(LOOK_TIME, looking).await.unwrap_or_else(|_| Err(late())).map(drop)
+        let looking = async {
+            match self.objects.get(&mark).await {
+                Err(object_store::Error::NotFound { .. }) if !self.is_folder => self.mark().await,
+                looked => looked.map(drop),
+            }
+        };
+        tokio::time::timeout(LOOK_TIME, looking).await.unwrap_or_else(|_| Err(late()))
+    }
+
+    /// An error if a folder is not mounted any more: writing would make it anew, on this machine alone.
+    async fn is_there(&self) -> Result<(), Unavailable> {
+        if self.is_folder {
+            self.look().await.map_err(|cause| self.unavailable(cause))?;
+        }
+        Ok(())
     }
 
     fn unavailable(&self, cause: object_store::Error) -> Unavailable {
@@ -275,6 +297,18 @@ impl SharedStore {
 /// The error of an answer that does not come.
 fn late() -> object_store::Error {
     object_store::Error::Generic { store: "shared", source: "it does not answer".into() }
+}
+
+/// True if the file system does not let this process write.
+fn is_forbidden(error: &object_store::Error) -> bool {
+    let mut source: Option<&(dyn std::error::Error + 'static)> = Some(error);
+    while let Some(cause) = source {
+        if let Some(system) = cause.downcast_ref::<std::io::Error>() {
+            return system.kind() == std::io::ErrorKind::PermissionDenied;
+        }
+        source = cause.source();
+    }
+    false
 }
 
 /// An error in one line. Of an answer of S3, which is XML, its code and message.

@@ -11,14 +11,14 @@ use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
 use bytes::{Buf as _, Bytes};
-use object_store::aws::AmazonS3Builder;
+use object_store::aws::{AmazonS3Builder, AmazonS3ConfigKey};
 use object_store::client::{
     HttpClient, HttpConnector, HttpError, HttpErrorKind, HttpRequest, HttpRequestBody, HttpResponse, HttpService,
 };
 use object_store::prefix::PrefixStore;
 use object_store::{BackoffConfig, ClientOptions, ObjectStore, RetryConfig};
-use ureq::http::Request;
 use ureq::http::header::CONTENT_LENGTH;
+use ureq::http::{Request, Uri};
 
 /// Time for a connection.
 const CONNECT_TIME: Duration = Duration::from_secs(3);
@@ -33,15 +33,28 @@ const ANSWER_TIME: Duration = Duration::from_secs(5);
 const RETRIES: usize = 3;
 const RETRY_TIME: Duration = Duration::from_secs(20);
 
-/// The store under a prefix of a bucket.
-pub fn open(bucket: &str, prefix: &str) -> object_store::Result<Arc<dyn ObjectStore>> {
+/// The store under a prefix of a bucket. The error is a sentence.
+pub fn open(bucket: &str, prefix: &str) -> Result<Arc<dyn ObjectStore>, String> {
     let backoff =
         BackoffConfig { init_backoff: Duration::from_millis(100), max_backoff: Duration::from_secs(2), base: 2.0 };
     let retry = RetryConfig { backoff, max_retries: RETRIES, retry_timeout: RETRY_TIME };
     let builder = AmazonS3Builder::from_env().with_bucket_name(bucket).with_allow_http(true).with_retry(retry);
+    if let Some(endpoint) = builder.get_config_value(&AmazonS3ConfigKey::Endpoint) {
+        check_endpoint(&endpoint)?;
+    }
     // One object is deleted at a time, and not every server of S3 knows how to delete several.
-    let store = builder.with_disable_bulk_delete(true).with_http_connector(Connector).build()?;
+    let store = builder.with_disable_bulk_delete(true).with_http_connector(Connector).build();
+    let store = store.map_err(|error| error.to_string())?;
     Ok(Arc::new(PrefixStore::new(store, prefix)))
+}
+
+/// Refuses an endpoint with which the crate would panic, or wait for ever.
+fn check_endpoint(endpoint: &str) -> Result<(), String> {
+    let uri = endpoint.parse::<Uri>().ok().filter(|uri| uri.host().is_some());
+    let is_http = uri.is_some_and(|uri| matches!(uri.scheme_str(), Some("http" | "https")));
+    is_http
+        .then_some(())
+        .ok_or_else(|| format!("AWS_ENDPOINT_URL is `{endpoint}`, and must begin with http:// or https://"))
 }
 
 #[derive(Debug)]

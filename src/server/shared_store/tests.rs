@@ -90,6 +90,7 @@ fn each_party_has_its_own_and_the_last_one_takes_the_pictures_along() {
         access
     };
     run(async {
+        store.reach().await.unwrap();
         store.put_mesh(&one).await.unwrap();
         store.put_picture(digest, "W/\"key\"", &picture()).await.unwrap();
         assert!(store.find_mesh(digest, &access("one")).await.unwrap().is_some());

@@ -116,6 +116,8 @@ const OPERATIONS: &[(&str, Outcome)] = &[
     ("docker build", Elsewhere("takes a container engine")),
     ("docker run", Elsewhere("takes a container engine")),
     ("Authorization: Bearer choose-one", Draws("out.png", [512, 512])),
+    ("AWS_ENDPOINT_URL", Elsewhere("the next one needs it")),
+    ("meshsnap serve --store s3://", Elsewhere("`http::shared_store` does so")),
 ];
 
 const PIPELINES: &[(&str, Outcome)] = &[

@@ -1,9 +1,11 @@
 //! Stored meshes and pictures of a service of several daemons, as the handlers use them: this daemon's memory first, then
 //! the shared store.
 //!
-//! A mesh that is at hand is looked up in the shared store again after [`KNOWN_FOR`](super::service::KNOWN_FOR), because another daemon may have
-//! deleted it. While the store cannot be reached, what is at hand is still drawn, and nothing is accepted that would have
-//! to be stored.
+//! A mesh that is at hand is looked up in the shared store again after some seconds ([`KNOWN_FOR`]), because another
+//! daemon may have deleted it. While the store cannot be reached, what is at hand is still drawn, and nothing is accepted
+//! that would have to be stored.
+//!
+//! [`KNOWN_FOR`]: super::service::KNOWN_FOR
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -77,7 +79,7 @@ pub async fn store_mesh(state: &AppState, shared: &Shared, mesh: NewMesh, access
     Ok(is_new)
 }
 
-/// Deletes a mesh for all daemons. Another one that has it at hand may draw it for [`KNOWN_FOR`](super::service::KNOWN_FOR) yet.
+/// Deletes a mesh for all daemons. Another one that has it at hand may draw it for some seconds yet.
 pub async fn delete_mesh(
     state: &AppState,
     shared: &Shared,

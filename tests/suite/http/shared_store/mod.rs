@@ -175,6 +175,21 @@ fn without_the_store_what_is_at_hand_is_drawn_and_nothing_is_accepted() {
     server.get(&format!("{}0", &mesh[..mesh.len() - 1])).problem(404, "mesh_unknown");
 }
 
+/// A folder that is not there any more, as one that was unmounted, is not made anew on this machine alone.
+#[test]
+fn nothing_is_written_where_a_folder_was() {
+    let parent = tempfile::tempdir().unwrap();
+    let [folder, away] = ["store", "away"].map(|name| parent.path().join(name));
+    std::fs::create_dir(&folder).unwrap();
+    let server = Server::start_with(&mut command(&of_folder(&folder), &[]));
+    std::fs::rename(&folder, &away).unwrap();
+    server.post("/v1/meshes", CUBE_OBJ).problem(503, "store_unavailable");
+    assert!(!folder.exists());
+    std::fs::rename(&away, &folder).unwrap();
+    wait("it is back", || server.get("/readyz").status == 200);
+    assert_eq!(server.post("/v1/meshes", CUBE_OBJ).status, 201);
+}
+
 /// Answers of the store that come late, and three connections that break: nothing fails, because an operation is tried four
 /// times.
 #[test]
@@ -222,7 +237,7 @@ fn an_upload_is_in_the_store_whatever_was_there() {
     assert_eq!(b.request("DELETE", &mesh, &[], b"").status, 204);
     assert_eq!(a.post("/v1/meshes", CUBE_OBJ).status, 201, "it is new, though this server has just seen it");
     assert_eq!(b.get(&mesh).status, 200);
-    assert_eq!(bucket.damage("team/a/meshes"), 1);
+    assert_eq!((bucket.damage("team/a/meshes"), bucket.names("team/a/meshsnap").len()), (1, 1));
     let c = Server::start_with(&mut at_bucket(&bucket, &[]));
     c.get(&mesh).problem(404, "mesh_unknown");
     assert_eq!(c.post("/v1/meshes", CUBE_OBJ).status, 200);
@@ -245,6 +260,10 @@ fn stores_that_cannot_be_used_are_said_at_the_start() {
     let file = tempfile::NamedTempFile::new().unwrap();
     usage(&mut command(&of_folder(file.path()), &[]), &["--store", "cannot be used"]);
     usage(&mut command("file:///nonexistent/x", &[]), &["--store", "/nonexistent/x", "cannot be used"]);
+    for endpoint in ["127.0.0.1:9000", "localhost:9000", "http://bad host", "ftp://127.0.0.1", "http://"] {
+        let mut wrong = command("s3://models/x", &[]);
+        usage(wrong.env("AWS_ENDPOINT_URL", endpoint), &["AWS_ENDPOINT_URL", endpoint, "http://"]);
+    }
     let Some(bucket) = Bucket::start() else { return };
     let mut missing = command("s3://others/x", &[]);
     bucket.introduce(&mut missing);
