@@ -62,7 +62,7 @@ pub struct SharedStore {
     is_folder: bool,
     /// Its address, for messages.
     address: String,
-    /// What the last look, or an operation since, has met; None: the store can be reached.
+    /// The error of the last look, or of an operation since. None: the store can be reached.
     trouble: Mutex<Option<String>>,
 }
 
@@ -248,7 +248,7 @@ impl SharedStore {
         }
     }
 
-    /// The crate does not try DELETE again by itself.
+    /// Deletes an object. Tries it again, because the crate does not.
     async fn delete(&self, place: &Path) -> Result<(), Unavailable> {
         let mut attempt = 0;
         loop {
