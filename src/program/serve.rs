@@ -59,9 +59,11 @@ pub fn run(arguments: &ServeArgs) -> Result<(), CliError> {
     let served = http::serve(&config, |address| announce(address, &config));
     telemetry::traces::finish();
     served.map_err(|error| match error {
-        ServeError::Unprotected(_) | ServeError::Keys(_) | ServeError::WebhookSecret | ServeError::WebhooksCa(_) => {
-            CliError::usage(error.to_string())
-        }
+        ServeError::Unprotected(_)
+        | ServeError::Keys(_)
+        | ServeError::WebhookSecret
+        | ServeError::WebhooksCa(_)
+        | ServeError::SharedQueue(_) => CliError::usage(error.to_string()),
         ServeError::Listen { error: ref cause, .. } if cause.kind() == ErrorKind::InvalidInput => {
             CliError::usage(error.to_string())
         }

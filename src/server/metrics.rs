@@ -36,6 +36,8 @@ pub struct Metrics {
     overdue: IntCounter,
     quarantined: IntGauge,
     resident: IntGauge,
+    shared: IntGaugeVec,
+    shared_oldest: IntGauge,
 }
 
 impl std::fmt::Debug for Metrics {
@@ -65,6 +67,10 @@ pub struct Gauges {
     pub gpu_losses: u64,
     /// Memory of the process.
     pub resident_bytes: u64,
+    /// Messages of the queue that several servers share, by kind. Empty where there is none, or it cannot be reached.
+    pub shared_queue: Vec<(&'static str, u64)>,
+    /// The age of the oldest job there, seconds.
+    pub shared_oldest_s: u64,
 }
 
 impl Metrics {
@@ -122,6 +128,15 @@ impl Metrics {
                 )?,
             )?,
             resident: registered(r, IntGauge::new("process_resident_memory_bytes", "Resident memory size in bytes.")?)?,
+            shared: gauge(
+                "meshsnap_shared_queue_messages",
+                "Messages in the queue that several servers share, and those that came more than once.",
+                &["kind"],
+            )?,
+            shared_oldest: registered(
+                r,
+                IntGauge::new("meshsnap_shared_queue_oldest_seconds", "Age of the oldest job in that queue.")?,
+            )?,
             registry,
         })
     }
@@ -186,6 +201,10 @@ impl Metrics {
         }
         self.gpu_losses.inc_by(gauges.gpu_losses.saturating_sub(self.gpu_losses.get()));
         self.resident.set(to_i64(gauges.resident_bytes));
+        for &(kind, count) in &gauges.shared_queue {
+            self.shared.with_label_values(&[kind]).set(to_i64(count));
+        }
+        self.shared_oldest.set(to_i64(gauges.shared_oldest_s));
         let mut text = Vec::new();
         TextEncoder::new().encode(&self.registry.gather(), &mut text)?;
         String::from_utf8(text).map_err(|error| prometheus::Error::Msg(error.to_string()))

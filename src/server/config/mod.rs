@@ -111,6 +111,14 @@ pub struct Config {
     pub body_bytes: u64,
     /// Wall-clock time for one job, from the moment at which a worker begins it to the encoded image, milliseconds.
     pub job_ms: u64,
+    /// The address of a queue of jobs that several servers share. None: this one has a queue of its own.
+    pub shared_queue: Option<String>,
+    /// Most jobs that wait there.
+    pub queue_jobs: u64,
+    /// The file of credentials for it.
+    pub queue_credentials: Option<PathBuf>,
+    /// The file of certificates by which its servers are trusted.
+    pub queue_ca: Option<PathBuf>,
     /// Jobs of a class that wait per worker. A full queue refuses a job at once and never blocks.
     pub queue_per_worker: u64,
     /// Limits of what a single job reads and draws.
@@ -164,6 +172,10 @@ impl Default for Config {
             body_bytes: 64 << 20,
             job_ms: 30_000,
             queue_per_worker: 64,
+            shared_queue: None,
+            queue_jobs: 100_000,
+            queue_credentials: None,
+            queue_ca: None,
             limits: Limits::default(),
         }
     }
@@ -274,7 +286,7 @@ mod tests {
             assert_eq!(copy, default, "{}", setting.key);
             checked += 1;
         }
-        assert_eq!(checked, SETTINGS.len() - 6);
+        assert_eq!(checked, SETTINGS.len() - 8);
     }
 
     #[test]

@@ -35,6 +35,9 @@ pub struct Setting {
 /// Longest time of any setting, milliseconds.
 const MS_MAX: u64 = JOB_MS_MAX;
 
+/// The largest number of jobs that wait for each worker.
+const QUEUE_MAX: u64 = 1 << 20;
+
 /// The largest rate of requests.
 const RATE_MAX: u64 = 1_000_000;
 
@@ -67,7 +70,25 @@ pub const SETTINGS: &[Setting] = &[
     number("worker-threads", "Threads within one CPU render; 0: the workers share the cores", 0, 1024, |c| {
         &mut c.worker_threads
     }),
-    number("queue", "Most jobs of a class that wait for each worker", 0, 1 << 20, |c| &mut c.queue_per_worker),
+    text(
+        "queue",
+        "Most jobs of a class that wait for each worker; or nats://HOST:PORT/NAME, a queue that servers share (with --store)",
+        set_queue,
+        |c| c.shared_queue.clone().unwrap_or_else(|| c.queue_per_worker.to_string()),
+    ),
+    number("queue-jobs", "Most jobs that wait in a queue that servers share", 1, 1 << 30, |c| &mut c.queue_jobs),
+    text(
+        "queue-credentials-file",
+        "File of credentials (.creds) for a queue that servers share",
+        |c, v| set_file(&mut c.queue_credentials, v),
+        |c| show_folder(&c.queue_credentials),
+    ),
+    text(
+        "queue-ca",
+        "File of certificates in PEM by which the servers of a shared queue are trusted, beside the system's",
+        |c, v| set_file(&mut c.queue_ca, v),
+        |c| show_folder(&c.queue_ca),
+    ),
     text("backend", "Back-end of requests that name none: auto, gpu or cpu", set_backend, |c| {
         word_for(c.backend).into()
     }),
@@ -280,6 +301,17 @@ fn set_listen(config: &mut Config, value: &str) -> Result<(), String> {
         ));
     }
     set(&mut config.listen, value)
+}
+
+fn set_queue(config: &mut Config, value: &str) -> Result<(), String> {
+    if value.contains("://") {
+        config.shared_queue = Some(value.to_owned());
+        return Ok(());
+    }
+    let number = value.parse().ok().filter(|number| *number <= QUEUE_MAX);
+    config.queue_per_worker =
+        number.ok_or_else(|| format!("a whole number from 0 to {QUEUE_MAX}, or an address: nats://HOST:PORT/NAME"))?;
+    Ok(())
 }
 
 fn set_store(config: &mut Config, value: &str) -> Result<(), String> {

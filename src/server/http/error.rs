@@ -139,6 +139,11 @@ impl ApiError {
         self
     }
 
+    /// True if trying again may help.
+    pub fn may_pass(&self) -> bool {
+        self.headers.iter().any(|(name, _)| name == header::RETRY_AFTER)
+    }
+
     /// Adds a header.
     pub fn header(mut self, name: HeaderName, value: &'static str) -> Self {
         self.headers.push((name, HeaderValue::from_static(value)));

@@ -1,10 +1,12 @@
 //! The connection between jobs and webhooks: it starts the sender of webhooks by the settings, and writes the message
 //! that a webhook gets at the end of a job, with the JSON of the job's state.
 
-use std::sync::Arc;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use serde::Serialize;
+use tokio::sync::oneshot;
 
 use super::ServeError;
 use super::dto::JobDto;
@@ -22,10 +24,30 @@ struct PayloadDto {
     data: JobDto,
 }
 
+/// Those who wait until a webhook was told, or is given up.
+#[derive(Default)]
+pub struct Settlements(Mutex<HashMap<String, oneshot::Sender<()>>>);
+
+impl Settlements {
+    /// Nothing more is sent to the webhook of the job with this id.
+    pub fn settle(&self, id: &str) {
+        if let Some(waiting) = self.0.lock().unwrap_or_else(PoisonError::into_inner).remove(id) {
+            let _ = waiting.send(());
+        }
+    }
+
+    /// Waits until [`Self::settle`] is called for this id.
+    pub fn expect(&self, id: String) -> oneshot::Receiver<()> {
+        let (sender, receiver) = oneshot::channel();
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(id, sender);
+        receiver
+    }
+}
+
 /// Starts the webhooks, if there is a secret by which they are signed.
 pub fn start(
     config: &Config,
-    durable: Option<Durable>,
+    (durable, settlements): (Option<Durable>, Arc<Settlements>),
     metrics: &Arc<Metrics>,
 ) -> Result<Option<Webhooks>, ServeError> {
     let Some(text) = &config.webhook_secret else { return Ok(None) };
@@ -45,6 +67,7 @@ pub fn start(
         metrics: Some(metrics.clone()),
     };
     let settled = move |id: &str| {
+        settlements.settle(id);
         if let (Some(durable), Some(id)) = (&durable, JobId::parse(id)) {
             durable.store_soon(vec![Change::Notified(id.key(), crate::jobs::unix_ms())], Vec::new());
         }

@@ -9,7 +9,7 @@
 //! 5. [`dto`] defines the JSON of answers, and [`error`] maps errors to statuses.
 //!
 //! [`recovery`] takes over what an earlier process has left in the data folder. [`negotiate`] and [`conditional`]
-//! read and write single headers. [`stored_mesh`] finds stored meshes for the handlers, and [`address`] makes the
+//! read and write single headers. [`stored_mesh`] finds stored meshes for the handlers, [`shared_jobs`] has the jobs that several daemons share, and [`address`] makes the
 //! URLs and tags of their pictures. [`event_streams`] counts the event streams of each client, [`hear_of_ends`] tells
 //! webhooks of the ends of jobs. [`static_document`] answers with a document that does not change; [`descriptions`]
 //! makes two of them. `signals` waits for the signals that end the server or make it read its keys again.
@@ -30,6 +30,7 @@ mod receive;
 mod recovery;
 mod resources;
 mod router;
+mod shared_jobs;
 mod signals;
 mod state;
 mod static_document;
@@ -44,6 +45,7 @@ use tokio::net::TcpListener;
 use crate::config::{Config, cores};
 use crate::durable::{OpenError, Recovered};
 use crate::keys::{Keys, KeysError};
+use crate::shared_queue::{self, QueueSettings, SharedQueue};
 use crate::shared_store::{self, SharedStore};
 use crate::warm_up::WarmUp;
 use connection::accept::ConnectionLimits;
@@ -93,6 +95,9 @@ pub enum ServeError {
     /// The shared store cannot be used.
     #[error(transparent)]
     Shared(#[from] shared_store::OpenError),
+    /// The shared queue cannot be used.
+    #[error(transparent)]
+    SharedQueue(#[from] shared_queue::OpenError),
     /// Threads or signal handlers could not be set up.
     #[error("the server could not start: {0}")]
     Start(#[from] std::io::Error),
@@ -128,11 +133,11 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     let mut signals = EndSignals::new()?;
     let hang_ups = HangUps::new()?;
 
-    let shared = tokio::select! {
+    let (shared, queue) = tokio::select! {
         shared = open_shared(config) => shared?,
         () = signals.next() => return Ok(()),
     };
-    let (state, recovered) = AppState::start(config, keys, shared, address.ip().is_loopback())?;
+    let (state, recovered) = AppState::start(config, keys, shared, queue, address.ip().is_loopback())?;
     tokio::spawn(reload_keys(hang_ups, state.clone()));
     let is_told_to_end = !take_over(&state, recovered, &mut signals).await?;
     if is_told_to_end {
@@ -176,13 +181,32 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     Ok(())
 }
 
-/// The shared store, once it answers. None: there is to be none.
-async fn open_shared(config: &Config) -> Result<Option<Shared>, shared_store::OpenError> {
-    let Some(address) = &config.store else { return Ok(None) };
-    let store = SharedStore::new(address)?;
+/// The shared store and the shared queue, once they answer. None: there is to be none.
+async fn open_shared(config: &Config) -> Result<(Option<Shared>, Option<SharedQueue>), ServeError> {
+    let queue = config.shared_queue.as_deref().map(shared_queue::Address::read).transpose();
+    let queue = queue.map_err(shared_queue::OpenError::from)?;
+    let Some(address) = &config.store else {
+        return match queue {
+            None => Ok((None, None)),
+            Some(_) => Err(shared_queue::OpenError::from(shared_queue::AddressError::NoStore).into()),
+        };
+    };
+    let store = SharedStore::new(address).map_err(shared_store::OpenError::from)?;
     store.reach().await?;
     tracing::info!(address, "the shared store answers");
-    Ok(Some(Shared::new(store)))
+    let Some(address) = queue else { return Ok((Some(Shared::new(store)), None)) };
+    store.check_conditions().await?;
+    let words = address.words();
+    let queue = SharedQueue::open(QueueSettings {
+        address,
+        credentials: config.queue_credentials.clone(),
+        ca: config.queue_ca.clone(),
+        jobs_max: config.queue_jobs,
+        note_time: Duration::from_millis(config.unfetched_ttl_ms),
+    })
+    .await?;
+    tracing::info!(address = words, "the shared queue answers");
+    Ok((Some(Shared::new(store)), Some(queue)))
 }
 
 /// Takes over what an earlier process has left. False if the server is told to end meanwhile.
@@ -207,6 +231,9 @@ async fn take_over(
         tokio::spawn(async move { store.watch().await });
     }
     recovery::recover(state, recovered);
+    if let Some(jobs) = &state.shared_jobs {
+        shared_jobs::start(jobs, state);
+    }
     Ok(true)
 }
 
@@ -242,7 +269,13 @@ async fn drain(state: &Arc<AppState>, time_max: Duration) {
     state.drain();
     // Without a data folder, what waits is lost if it is not finished.
     let waits = if state.durable.is_some() { Duration::ZERO } else { load.batch_wait.max(load.wait) * 2 };
-    if tokio::time::timeout(time_max + waits, state.jobs.idle()).await.is_err() {
+    let idle = async {
+        state.jobs.idle().await;
+        if let Some(jobs) = &state.shared_jobs {
+            jobs.idle().await;
+        }
+    };
+    if tokio::time::timeout(time_max + waits, idle).await.is_err() {
         tracing::warn!("some jobs did not end in time; those in a data folder are done at the next start");
     }
 }

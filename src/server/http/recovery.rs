@@ -4,6 +4,8 @@
 
 use std::sync::Arc;
 
+use bytes::Bytes;
+
 use super::error::{ApiError, record_of};
 use super::hear_of_ends;
 use super::receive::keys::Keys;
@@ -14,10 +16,10 @@ use crate::durable::{
     Change, ClaimRecord, FileRecord, Hold, JobRecord, MeshRecord, Recovered, RecoveredJob, RequestKind,
 };
 use crate::jobs::{
-    Claim, ClaimName, Failure, JSON, JobId, JobState, Named, Newer, Owner, Recipe, Restored, Task, Work, read_picture,
+    Claim, ClaimName, Failure, JSON, JobId, JobState, Named, Newer, Owner, Recipe, Restored, Task, Work, read_end,
     value_of,
 };
-use crate::memory::Account;
+use crate::memory::{Account, MemoryShare};
 use crate::shared_store::OpenError;
 use crate::store::{NewMesh, Reading};
 use meshsnap_render::import::{Bundle, BundleFile, Format};
@@ -126,22 +128,10 @@ fn mesh_of(recovered: &Recovered, record: MeshRecord) -> Option<(NewMesh, Vec<Ar
 }
 
 fn restore_result(state: &AppState, recovered: &Recovered, name: Restored, job: RecoveredJob) {
-    let Some(mut end) = job.end else { return };
-    let mut holds = Vec::new();
-    let ended = match (end.picture.take(), end.error.take()) {
-        (Some(picture), _) => {
-            let found = recovered.bytes(picture.digest);
-            let read = found.and_then(|(bytes, hold)| {
-                holds.push(hold);
-                read_picture(picture, bytes)
-            });
-            read.map_or(JobState::Failed(Arc::new(Failure::Lost)), |finished| {
-                JobState::Done(Arc::new(finished.counted(&state.memory)))
-            })
-        }
-        (None, Some(error)) => JobState::Failed(Arc::new(Failure::Recorded(error))),
-        (None, None) => JobState::Cancelled,
-    };
+    let Some(end) = job.end else { return };
+    let found = end.picture.as_ref().and_then(|picture| recovered.bytes(picture.digest));
+    let (content, hold) = found.unzip();
+    let (ended, holds) = (read_end(&end, content, &state.memory), hold.into_iter().collect());
     state.jobs.restore(name, ended, Some(&end), holds);
 }
 
@@ -151,54 +141,74 @@ fn resumed(state: &AppState, recovered: &Recovered, job: &RecoveredJob) -> Resul
         return Err(Failure::Crashed { times: job.starts });
     }
     let record = &job.record;
-    let (files, mut holds) = files(recovered, &record.files).ok_or(Failure::Lost)?;
-    let document = match record.request.document {
-        Some(digest) => {
-            let (bytes, hold) = recovered.bytes(digest).ok_or(Failure::Lost)?;
-            holds.push(hold);
-            Some(bytes)
-        }
-        None => None,
+    let side = |records: &[FileRecord], is_zip| {
+        let (files, holds) = files(recovered, records).ok_or(Failure::Lost)?;
+        Ok::<_, Failure>(Side::sent(state, files, is_zip, holds))
     };
-    let newer = match &record.newer {
-        Some(side) => {
-            let (files, own) = self::files(recovered, &side.files).ok_or(Failure::Lost)?;
-            let bundle = Bundle::restored(files, side.is_zip, record.entry.clone());
-            let memory = state.memory.share(Account::Uploads);
-            memory.take(bundle.bytes_len());
-            holds.extend(own.iter().cloned());
-            Some(Newer { bundle, memory: Arc::new(memory), holds: own.into(), mesh: side.mesh })
-        }
-        None => None,
-    };
+    let older = side(&record.files, record.is_zip)?;
+    let newer = record.newer.as_ref().map(|newer| side(&newer.files, newer.is_zip)).transpose()?;
+    let found = record.request.document.map(|digest| recovered.bytes(digest).ok_or(Failure::Lost)).transpose()?;
+    let (document, hold) = found.unzip();
+    let mut holds: Vec<_> = older.holds.iter().cloned().collect();
+    holds.extend(newer.iter().flat_map(|side| side.holds.iter().cloned()).chain(hold));
+    // The holds are the job's own.
+    let older = Side { holds: [].into(), ..older };
+    Ok((work_of(state, record, document, older, newer)?, holds))
+}
+
+/// The bytes of a mesh of a recorded job, and their memory.
+pub struct Side {
+    /// The mesh and the files beside it.
+    pub bundle: Bundle,
+    /// The memory of `bundle`.
+    pub memory: Arc<MemoryShare>,
+    /// The bundle's files in the data folder.
+    pub holds: Arc<[Arc<Hold>]>,
+}
+
+impl Side {
+    /// A mesh that was sent with its request.
+    pub fn sent(state: &AppState, files: Vec<BundleFile>, is_zip: bool, holds: Vec<Arc<Hold>>) -> Self {
+        let bundle = Bundle::restored(files, is_zip, None);
+        let memory = state.memory.share(Account::Uploads);
+        memory.take(bundle.bytes_len());
+        Self { bundle, memory: Arc::new(memory), holds: holds.into() }
+    }
+}
+
+/// The work of a recorded job: its request is read again. `newer` is the second mesh of a comparison.
+pub fn work_of(
+    state: &AppState,
+    record: &JobRecord,
+    document: Option<Bytes>,
+    older: Side,
+    newer: Option<Side>,
+) -> Result<Work, Failure> {
+    let of_newer = record.newer.as_ref().and_then(|record| record.mesh);
+    let newer = newer.map(|Side { bundle, memory, holds }| Newer {
+        bundle: bundle.with_entry(record.entry.clone()),
+        memory,
+        holds,
+        mesh: of_newer,
+    });
     let task = task(state, record, document.as_deref(), newer)?;
     let recipe = Recipe { document, overrides: record.request.overrides.clone().into(), mesh: record.mesh };
-    let bundle = Bundle::restored(files, record.is_zip, record.entry.clone());
-    let memory = state.memory.share(Account::Uploads);
-    memory.take(bundle.bytes_len());
     let reading = reading(record.format_in.as_deref(), record.entry.clone());
     let mesh_key = record.mesh.map(|digest| stored_mesh::key(digest, &reading));
-    let (format_in, memory, recipe) = (reading.format_in, Arc::new(memory), Some(Arc::new(recipe)));
-    let (owner, request_id) = (Owner::new(&record.owner), record.request_id.as_str().into());
-    let (claim, own, webhook) = (None, [].into(), record.webhook.as_deref().map(Into::into));
-    let lender = None;
-    Ok((
-        Work {
-            bundle,
-            format_in,
-            mesh_key,
-            task,
-            memory,
-            lender,
-            recipe,
-            owner,
-            request_id,
-            holds: own,
-            claim,
-            webhook,
-        },
-        holds,
-    ))
+    Ok(Work {
+        bundle: older.bundle.with_entry(record.entry.clone()),
+        format_in: reading.format_in,
+        mesh_key,
+        task,
+        memory: older.memory,
+        lender: None,
+        recipe: Some(Arc::new(recipe)),
+        owner: Owner::new(&record.owner),
+        request_id: record.request_id.as_str().into(),
+        holds: older.holds,
+        claim: None,
+        webhook: record.webhook.as_deref().map(Into::into),
+    })
 }
 
 /// The name of the job's request, so that the request is known when it is sent again.
@@ -244,6 +254,7 @@ fn files(recovered: &Recovered, records: &[FileRecord]) -> Option<Files> {
     found.collect()
 }
 
-fn reading(format_in: Option<&str>, entry: Option<String>) -> Reading {
+/// The way in which a recorded mesh is read.
+pub fn reading(format_in: Option<&str>, entry: Option<String>) -> Reading {
     Reading { format_in: format_in.and_then(Format::from_name), entry }
 }

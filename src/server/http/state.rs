@@ -6,6 +6,8 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use super::event_streams::EventStreams;
+use super::hear_of_ends::Settlements;
+use super::shared_jobs::service::SharedJobs;
 use super::static_document::StaticDocument;
 use super::stored_mesh::service::Shared;
 use super::{ServeError, descriptions, error, hear_of_ends};
@@ -19,6 +21,7 @@ use crate::pictures::Pictures;
 use crate::priority::with_low_threads;
 use crate::rates::Rates;
 use crate::residents::Residents;
+use crate::shared_queue::SharedQueue;
 use crate::store::Store;
 use crate::webhooks::Webhooks;
 use meshsnap_render::backend::cpu::DrawingThreads;
@@ -48,6 +51,8 @@ pub struct AppState {
     pub durable: Option<Durable>,
     /// The store that several daemons share. None: this one is alone.
     pub shared: Option<Shared>,
+    /// The jobs that several daemons share. None: this one has its own.
+    pub shared_jobs: Option<Arc<SharedJobs>>,
     /// The webhooks. None: there is no secret for them.
     pub webhooks: Option<Webhooks>,
     /// The clients that follow jobs.
@@ -88,6 +93,7 @@ impl AppState {
         config: &Config,
         keys: Keys,
         shared: Option<Shared>,
+        queue: Option<SharedQueue>,
         is_local: bool,
     ) -> Result<(Arc<Self>, Recovered), ServeError> {
         let (durable, recovered) = match &config.data_dir {
@@ -105,31 +111,27 @@ impl AppState {
         let memory = Memory::new(&memory_limits(config));
         let residents = Arc::new(Residents::new(config.resident_bytes, memory.clone()));
         let renderers = pipeline_renderers(gpu.clone(), threads, config.limits.clone(), residents.clone());
+        let settlements = Arc::new(Settlements::default());
         let metrics = Arc::new(Metrics::new().map_err(std::io::Error::other)?);
-        let webhooks = hear_of_ends::start(config, durable.clone(), &metrics)?;
+        let webhooks = hear_of_ends::start(config, (durable.clone(), settlements.clone()), &metrics)?;
         let settings = JobSettings {
-            workers: to_usize(config.workers),
-            queue: to_usize(config.queue_per_worker.saturating_mul(config.workers)),
-            idle_time: IDLE_TIME,
-            job_time: Duration::from_millis(config.job_ms),
-            overdue_grace: Duration::from_millis(config.overdue_grace_ms),
-            result_ttl: Duration::from_millis(config.result_ttl_ms),
-            interactive_wait: Duration::from_millis(config.wait_ms),
-            batch_wait: Duration::from_millis(config.batch_wait_ms),
-            unfetched_ttl: Duration::from_millis(config.unfetched_ttl_ms),
-            result_bytes: memory.cap(Account::Results),
-            result_count: to_usize(config.result_count),
-            memory: memory.clone(),
             metrics: Some(metrics.clone()),
             webhooks: hear_of_ends::of_jobs(webhooks.as_ref()),
             storage: durable.clone().map(|durable| Storage { durable, describe: error::record }),
+            ..job_settings(config, &memory)
         };
         let rules = Rules { limits: config.limits.clone(), backend: config.backend };
+        let jobs = Jobs::start(settings, renderers)?;
+        let shared_jobs = queue.zip(shared.as_ref()).map(|(queue, shared)| {
+            let end_time = Duration::from_millis(config.unfetched_ttl_ms);
+            Arc::new(SharedJobs::new((queue, shared.store.clone()), &jobs, settlements, end_time))
+        });
         let state = Arc::new(Self {
             schema: descriptions::schema(&rules),
             openapi: OnceLock::new(),
             rules,
-            jobs: Jobs::start(settings, renderers)?,
+            jobs,
+            shared_jobs,
             gpu,
             // With a shared store, the one in memory is a cache of it, and the data folder has jobs alone.
             meshes: Store::new(
@@ -180,6 +182,27 @@ impl AppState {
     /// True once [`AppState::drain`] was called.
     pub fn is_draining(&self) -> bool {
         self.draining.load(Ordering::Relaxed)
+    }
+}
+
+/// The settings of jobs, which nobody hears of and nothing stores yet.
+fn job_settings(config: &Config, memory: &Arc<Memory>) -> JobSettings {
+    JobSettings {
+        workers: to_usize(config.workers),
+        queue: to_usize(config.queue_per_worker.saturating_mul(config.workers)),
+        idle_time: IDLE_TIME,
+        job_time: Duration::from_millis(config.job_ms),
+        overdue_grace: Duration::from_millis(config.overdue_grace_ms),
+        result_ttl: Duration::from_millis(config.result_ttl_ms),
+        interactive_wait: Duration::from_millis(config.wait_ms),
+        batch_wait: Duration::from_millis(config.batch_wait_ms),
+        unfetched_ttl: Duration::from_millis(config.unfetched_ttl_ms),
+        result_bytes: memory.cap(Account::Results),
+        result_count: to_usize(config.result_count),
+        memory: memory.clone(),
+        metrics: None,
+        webhooks: None,
+        storage: None,
     }
 }
 

@@ -102,11 +102,6 @@ impl Estimates {
         Size { formula_s: formula_ns * 1e-9, kind, mesh, is_known, formula_bytes }
     }
 
-    /// The size of a job that has ended before.
-    pub fn no_size(&self) -> Size {
-        Size { formula_s: 0.0, kind: 0, mesh: None, is_known: false, formula_bytes: 0.0 }
-    }
-
     /// The time for which a job of this size is likely to occupy a worker.
     pub fn estimate(&self, size: Size) -> Duration {
         let of_mesh = size.mesh.filter(|_| size.is_known).and_then(|mesh| self.meshes.get(&mesh));

@@ -4,7 +4,7 @@
 //! Architecture invariants: a full queue refuses at once and never waits. While the process runs, an accepted job is
 //! never dropped before its end. A panic costs its job alone. Nothing here knows HTTP.
 //!
-//! Reading order: [`job`] (one job and its states), `class` (its owner, and whether a client waits for it),
+//! Reading order: [`job`] (one job and its states, or those of another server's), `class` (its owner, and whether a client waits for it),
 //! [`claims`] (names of requests), [`progress`] (how far it has come), [`queue`] (those that wait), [`registry`] (all
 //! jobs, behind one lock), [`dispatch`] (the hand-over to workers), [`results`] (those that have ended), [`storage`]
 //! (jobs in the data folder), [`estimates`] (time and memory that jobs will take), [`worker`] (does the jobs),
@@ -32,7 +32,7 @@ pub use job::{
     Checking, Comparing, Failure, Finished, Job, JobId, JobState, Media, Newer, Product, Recipe, Task, Timings, Work,
 };
 pub use progress::{Progress, Step};
-pub use storage::{JSON, Storage, name, picture_record, read_picture, value_of};
+pub use storage::{JSON, Storage, end_of, name, picture_record, read_end, read_picture, record_of, value_of};
 pub use worker::{CpuThreads, Renderer, RendererFactory, pipeline_renderers};
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -282,10 +282,6 @@ impl Jobs {
         Ok(jobs)
     }
 
-    fn check_mesh(&self, work: &Work) -> Result<(), Refusal> {
-        self.registry.quarantine.holds(&work.meshes()).map_or(Ok(()), |mesh| Err(Refusal::Quarantined { mesh }))
-    }
-
     /// Most works that [`Jobs::accept_all`] may ever accept at once.
     pub fn accepted_max(&self) -> usize {
         self.registry.accepted_max()
@@ -314,7 +310,24 @@ impl Jobs {
 
     /// Queues a job that an earlier process has accepted at this time.
     pub fn resume(&self, name: (JobId, u64), work: Work, holds: Vec<Arc<Hold>>) {
-        self.registry.resume(name, work, holds);
+        self.registry.resume(name, work, true, holds);
+    }
+
+    /// Queues a job of a queue that several servers share, for the workers of this one. It lives as long as its handle:
+    /// its end is the service's.
+    pub fn do_shared(&self, name: (JobId, u64), work: Work) -> Arc<Job> {
+        self.registry.resume(name, work, false, Vec::new())
+    }
+
+    /// The mesh of a work that is refused, because it keeps workers busy beyond the time of a job.
+    pub fn check_mesh(&self, work: &Work) -> Result<(), Refusal> {
+        self.registry.quarantine.holds(&work.meshes()).map_or(Ok(()), |mesh| Err(Refusal::Quarantined { mesh }))
+    }
+
+    /// Number of jobs that this server does for a queue that several share: those that its workers can do, and one that
+    /// waits for each.
+    pub fn shared_slots(&self) -> usize {
+        2 * self.registry.batch_workers()
     }
 
     /// Adds a job that has ended in an earlier process, or whose end is found out now.

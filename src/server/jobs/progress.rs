@@ -41,6 +41,11 @@ impl Step {
             Self::Encoding => "encoding",
         }
     }
+
+    /// The step of this name; the first for any other.
+    pub fn of_name(name: &str) -> Self {
+        Self::ALL.into_iter().find(|step| step.name() == name).unwrap_or_default()
+    }
 }
 
 impl Progress {

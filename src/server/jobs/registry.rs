@@ -176,11 +176,12 @@ impl JobRegistry {
         let estimate = self.estimates.estimate(size).min(self.settings.job_time);
         let (memory_bytes, owner) = (self.memory_of(size), work.owner.clone());
         self.check_memory(memory_bytes)?;
-        self.check(inner, if is_kept { Class::Batch } else { Class::Interactive }, &owner)?;
+        self.check(inner, class_of(is_kept), &owner)?;
         inner.serial += 1;
         let rank = self.began.elapsed() + (estimate * PATIENCE).min(self.settings.job_time / 4);
-        let (serial, claim) = (inner.serial, work.claim.clone());
-        let admission = Admission { is_kept, owner, is_durable, serial, size, estimate, memory_bytes, rank, claim };
+        let (serial, claim, class) = (inner.serial, work.claim.clone(), class_of(is_kept));
+        let admission =
+            Admission { is_kept, class, owner, is_durable, serial, size, estimate, memory_bytes, rank, claim };
         let job = Arc::new(Job::new(Some(work), admission, None));
         inner.queue.reserve(job.class, &job.owner, estimate);
         Ok(job)
@@ -200,16 +201,17 @@ impl JobRegistry {
         self.wake_if_draining(&inner);
     }
 
-    /// Queues a job that an earlier process has accepted, however full the queue is. `holds` are its bytes in
-    /// the data folder.
-    pub fn resume(&self, name: (JobId, u64), work: Work, holds: Vec<Arc<Hold>>) -> Arc<Job> {
+    /// Queues a job that was accepted before, by an earlier process or by another server, however full the queue is. One
+    /// that is not kept lives as long as its handle. `holds` are its bytes in the data folder.
+    pub fn resume(&self, name: (JobId, u64), work: Work, is_kept: bool, holds: Vec<Arc<Hold>>) -> Arc<Job> {
         let size = self.estimates.size(&work);
         let estimate = self.estimates.estimate(size).min(self.settings.job_time);
         let mut inner = self.lock();
         inner.serial += 1;
         let (serial, rank, owner, claim) = (inner.serial, Duration::ZERO, work.owner.clone(), work.claim.clone());
-        let (is_kept, is_durable, memory_bytes) = (true, true, self.memory_of(size));
-        let admission = Admission { is_kept, owner, is_durable, serial, size, estimate, memory_bytes, rank, claim };
+        let (is_durable, class, memory_bytes) = (is_kept, Class::Batch, self.memory_of(size));
+        let admission =
+            Admission { is_kept, class, owner, is_durable, serial, size, estimate, memory_bytes, rank, claim };
         let job = Arc::new(Job::new(Some(work), admission, Some(name)));
         job.hold(holds);
         inner.queue.reserve(job.class, &job.owner, estimate);
@@ -222,9 +224,10 @@ impl JobRegistry {
         let Restored { id, accepted_unix_ms, owner, claim } = name;
         let name = (id, accepted_unix_ms);
         let mut inner = self.lock();
-        let (size, estimate, rank, serial) = (self.estimates.no_size(), Duration::ZERO, Duration::ZERO, 0);
-        let (is_kept, is_durable, memory_bytes) = (true, true, 0);
-        let admission = Admission { is_kept, owner, is_durable, serial, size, estimate, memory_bytes, rank, claim };
+        let (size, estimate, rank, serial) = (Size::default(), Duration::ZERO, Duration::ZERO, 0);
+        let (is_kept, class, is_durable, memory_bytes) = (true, Class::Batch, true, 0);
+        let admission =
+            Admission { is_kept, class, owner, is_durable, serial, size, estimate, memory_bytes, rank, claim };
         let job = Arc::new(Job::new(None, admission, Some(name)));
         job.hold(holds);
         inner.results.add(&job, &state, is_fetched, &self.settings);
@@ -546,6 +549,11 @@ impl JobRegistry {
     pub(super) fn lock(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// What can be found by its id is fetched later.
+fn class_of(is_kept: bool) -> Class {
+    if is_kept { Class::Batch } else { Class::Interactive }
 }
 
 /// Seconds after which to try again, at least 1 and at most an hour.

@@ -1,4 +1,4 @@
-//! The form of jobs in the data folder: it makes records of accepted jobs and of their ends, and reads stored results
+//! The form of jobs in the data folder, and in a store that several servers share: it makes records of accepted jobs and of their ends, and reads stored results
 //! again. `http/recovery.rs` makes jobs of the records after a restart.
 
 use std::collections::HashSet;
@@ -7,12 +7,13 @@ use std::time::Duration;
 
 use bytes::Bytes;
 
-use super::job::{Failure, Finished, Job, JobState, Media, Newer, Task, Timings, Work, unix_ms};
+use super::job::{Failure, Finished, Job, JobId, JobState, Media, Newer, Task, Timings, Work, unix_ms};
 use crate::digest::Digest;
 use crate::durable::{
     ClaimRecord, Durable, EndRecord, ErrorRecord, FileRecord, Hold, JobRecord, PictureRecord, RequestKind,
     RequestRecord, SelectionRecord, SideRecord, Unstored, WarningRecord,
 };
+use crate::memory::Memory;
 use meshsnap_render::backend::{BackendKind, DrawTimes};
 use meshsnap_render::import::Bundle;
 use meshsnap_render::pipeline::QualitySelection;
@@ -48,84 +49,121 @@ impl std::fmt::Debug for Storage {
 impl Storage {
     /// The record of a job that is accepted. Writes files, so it may take long.
     pub fn of_job(&self, job: &Job, work: &Work) -> Result<Stored<JobRecord>, Unstored> {
-        let (files, mut holds) = self.of_files(&work.bundle, &work.holds)?;
-        let newer = match &work.task {
-            Task::Diff(comparing) => {
-                let Newer { bundle, holds: known, mesh, .. } = &comparing.newer;
-                let (files, own) = self.of_files(bundle, known)?;
-                holds.extend(own);
-                Some(SideRecord { files, is_zip: bundle.is_zip(), mesh: *mesh })
-            }
-            Task::Draw(_) | Task::Inspect { .. } | Task::Check(_) => None,
-        };
-        let recipe = work.recipe.clone().unwrap_or_default();
-        let document = recipe.document.as_ref().map(|bytes| self.durable.hold(bytes)).transpose()?;
-        let (kind, format, upload) = match &work.task {
-            Task::Draw(spec) => (RequestKind::Draw, spec.image.format.map_or("png", word_for), None),
-            Task::Inspect { .. } => (RequestKind::Draw, "", None),
-            Task::Check(checking) => (RequestKind::Check, JSON, Some(checking.digest)),
-            Task::Diff(comparing) => {
-                let picture = comparing.picture.as_ref().and_then(|spec| spec.image.format);
-                (RequestKind::Diff, picture.map_or(JSON, word_for), None)
-            }
-        };
-        let request = RequestRecord {
-            document: document.as_ref().map(|hold| hold.digest()),
-            names_mesh: recipe.mesh.is_some(),
-            overrides: recipe.overrides.to_vec(),
-            format: format.to_owned(),
-            kind,
-            upload,
-        };
-        holds.extend(document);
-        let record = JobRecord {
-            key: job.id.key(),
-            accepted_unix_ms: job.accepted_unix_ms,
-            request,
-            files,
-            is_zip: work.bundle.is_zip(),
-            format_in: work.format_in.map(|format| format.name().to_owned()),
-            entry: work.bundle.entry().map(str::to_owned),
-            owner: work.owner.to_string(),
-            request_id: work.request_id.to_string(),
-            mesh: recipe.mesh,
-            webhook: work.webhook.as_deref().map(str::to_owned),
-            newer,
-            claim: work
-                .claim
-                .as_ref()
-                .map(|claim| ClaimRecord { key: claim.name.key.to_string(), request: claim.request }),
-        };
+        let mut holds = Vec::new();
+        let record = record_of((job.id, job.accepted_unix_ms), work, true, &mut |bytes, known| {
+            let hold = known.map_or_else(|| self.durable.hold(bytes), |hold| Ok(hold.clone()))?;
+            let digest = hold.digest();
+            holds.push(hold);
+            Ok(digest)
+        })?;
         Ok((record, holds))
-    }
-
-    /// The records of the files of a bundle. They are in the data folder already if there are as many holds.
-    fn of_files(&self, bundle: &Bundle, holds: &[Arc<Hold>]) -> Result<Stored<Vec<FileRecord>>, Unstored> {
-        let files = bundle.files();
-        let holds = match holds.len() == files.len() {
-            true => holds.to_vec(),
-            false => files.iter().map(|file| self.durable.hold(&file.bytes)).collect::<Result<_, _>>()?,
-        };
-        let digests = holds.iter().map(|hold| hold.digest());
-        let records = files.iter().zip(digests).map(|(file, digest)| FileRecord { path: file.path.clone(), digest });
-        Ok((records.collect(), holds))
     }
 
     /// The record of a job's end. Writes the file of a large picture.
     pub fn of_end(&self, state: &JobState) -> Result<Stored<EndRecord>, Unstored> {
-        let mut end = EndRecord { at_unix_ms: unix_ms(), ..EndRecord::default() };
-        let mut holds = Vec::new();
-        match state {
-            JobState::Done(finished) => {
-                let hold = self.durable.hold(&finished.content)?;
-                end.picture = Some(picture_record(finished, hold.digest()));
-                holds.push(hold);
-            }
-            JobState::Failed(failure) => end.error = Some((self.describe)(failure)),
-            JobState::Queued | JobState::Running | JobState::Inspected(_) | JobState::Cancelled => {}
-        }
-        Ok((end, holds))
+        let hold = match state {
+            JobState::Done(finished) => Some(self.durable.hold(&finished.content)?),
+            _ => None,
+        };
+        let end = end_of(state, hold.as_ref().map(|hold| hold.digest()), self.describe);
+        Ok((end, hold.into_iter().collect()))
     }
+}
+
+/// The record of an end. `content` names the bytes of a result.
+pub fn end_of(state: &JobState, content: Option<Digest>, describe: fn(&Failure) -> ErrorRecord) -> EndRecord {
+    let end = EndRecord { at_unix_ms: unix_ms(), ..EndRecord::default() };
+    match (state, content) {
+        (JobState::Done(finished), Some(digest)) => {
+            EndRecord { picture: Some(picture_record(finished, digest)), ..end }
+        }
+        (JobState::Failed(failure), _) => EndRecord { error: Some(describe(failure)), ..end },
+        _ => end,
+    }
+}
+
+/// The state that a record of an end means. `content` has the bytes of a result, unless they are lost.
+pub fn read_end(end: &EndRecord, content: Option<Bytes>, memory: &Arc<Memory>) -> JobState {
+    match (&end.picture, &end.error) {
+        (Some(picture), _) => {
+            let read = content.and_then(|bytes| read_picture(picture.clone(), bytes));
+            read.map_or(JobState::Failed(Arc::new(Failure::Lost)), |finished| {
+                JobState::Done(Arc::new(finished.counted(memory)))
+            })
+        }
+        (None, Some(error)) => JobState::Failed(Arc::new(Failure::Recorded(error.clone()))),
+        (None, None) => JobState::Cancelled,
+    }
+}
+
+/// Keeps bytes for a record, and returns their name. A hold says that the data folder has them already.
+pub type Keep<'k, E> = dyn FnMut(&Bytes, Option<&Arc<Hold>>) -> Result<Digest, E> + 'k;
+
+/// The record of a job with this name and time of acceptance. The files of stored meshes are kept for it only if
+/// `keeps_stored` is true.
+pub fn record_of<E>(
+    (id, accepted_unix_ms): (JobId, u64),
+    work: &Work,
+    keeps_stored: bool,
+    keep: &mut Keep<'_, E>,
+) -> Result<JobRecord, E> {
+    let recipe = work.recipe.clone().unwrap_or_default();
+    let mut files_of = |bundle: &Bundle, holds: &[Arc<Hold>], mesh: Option<Digest>| match mesh {
+        Some(_) if !keeps_stored => Ok(Vec::new()),
+        _ => keep_files(bundle, holds, keep),
+    };
+    let files = files_of(&work.bundle, &work.holds, recipe.mesh)?;
+    let newer = match &work.task {
+        Task::Diff(comparing) => {
+            let Newer { bundle, holds, mesh, .. } = &comparing.newer;
+            Some(SideRecord { files: files_of(bundle, holds, *mesh)?, is_zip: bundle.is_zip(), mesh: *mesh })
+        }
+        Task::Draw(_) | Task::Inspect { .. } | Task::Check(_) => None,
+    };
+    let document = recipe.document.as_ref().map(|bytes| keep(bytes, None)).transpose()?;
+    let (kind, format, upload) = match &work.task {
+        Task::Draw(spec) => (RequestKind::Draw, spec.image.format.map_or("png", word_for), None),
+        Task::Inspect { .. } => (RequestKind::Draw, "", None),
+        Task::Check(checking) => (RequestKind::Check, JSON, Some(checking.digest)),
+        Task::Diff(comparing) => {
+            let picture = comparing.picture.as_ref().and_then(|spec| spec.image.format);
+            (RequestKind::Diff, picture.map_or(JSON, word_for), None)
+        }
+    };
+    let request = RequestRecord {
+        document,
+        names_mesh: recipe.mesh.is_some(),
+        overrides: recipe.overrides.to_vec(),
+        format: format.to_owned(),
+        kind,
+        upload,
+    };
+    Ok(JobRecord {
+        key: id.key(),
+        accepted_unix_ms,
+        request,
+        files,
+        is_zip: work.bundle.is_zip(),
+        format_in: work.format_in.map(|format| format.name().to_owned()),
+        entry: work.bundle.entry().map(str::to_owned),
+        owner: work.owner.to_string(),
+        request_id: work.request_id.to_string(),
+        mesh: recipe.mesh,
+        webhook: work.webhook.as_deref().map(str::to_owned),
+        newer,
+        claim: work.claim.as_ref().map(|claim| ClaimRecord { key: claim.name.key.to_string(), request: claim.request }),
+    })
+}
+
+/// The records of the files of a bundle. They are in the data folder already if there are as many holds.
+fn keep_files<E>(bundle: &Bundle, holds: &[Arc<Hold>], keep: &mut Keep<'_, E>) -> Result<Vec<FileRecord>, E> {
+    let files = bundle.files();
+    let known = |index| holds.get(index).filter(|_| holds.len() == files.len());
+    let records = files
+        .iter()
+        .enumerate()
+        .map(|(index, file)| Ok(FileRecord { path: file.path.clone(), digest: keep(&file.bytes, known(index))? }));
+    records.collect()
 }
 
 /// The record of a picture or a verdict whose bytes have this digest.

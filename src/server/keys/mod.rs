@@ -125,6 +125,11 @@ impl Key {
 }
 
 impl Access {
+    /// The access of an accepted job: whether its owner sees its mesh was asked before.
+    pub fn of_job(owner: Owner) -> Self {
+        Self { owner, sees_all: true, is_open: false }
+    }
+
     /// The access of everybody where there are no keys.
     pub fn open(owner: Owner) -> Self {
         Self { owner, sees_all: true, is_open: true }

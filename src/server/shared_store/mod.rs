@@ -1,5 +1,5 @@
 //! The shared store: a bucket of S3, or a folder that several machines mount, in which any number of daemons keep what
-//! each of them must find. These are the stored meshes, and the pictures that were drawn of them. What a daemon has in
+//! each of them must find. These are the stored meshes, the pictures that were drawn of them, and jobs. What a daemon has in
 //! memory is a cache of it then.
 //!
 //! Objects under the address's prefix:
@@ -10,6 +10,8 @@
 //! - `pictures/SHA-256/KEY`: a picture of that mesh under its render key, which is a digest of all that decides the
 //!   picture. Two daemons that draw the same picture write the same object. Nothing depends on these objects: they may
 //!   be deleted at any time.
+//! - `jobs/ID` and `results/ID`: a job that has not ended, and the end of one ([`jobs`]). Servers without a shared queue
+//!   write none.
 //! - `meshsnap`: marks the store as one. Each server writes it at its start, and looks from time to time whether it is there.
 //!
 //! [`objects`] has the form of the objects. [`s3`] opens a bucket.
@@ -17,6 +19,7 @@
 //! Architecture invariant: nothing here knows HTTP requests of clients, or keeps bytes in memory.
 
 mod address;
+mod jobs;
 mod objects;
 #[cfg(feature = "cluster")]
 mod s3;
@@ -24,6 +27,7 @@ mod s3;
 mod tests;
 
 pub use address::AddressError;
+pub use jobs::{AcceptedJob, Ages, EndedJob, FoundJob};
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -44,8 +48,8 @@ const LOOK_EVERY: Duration = Duration::from_secs(5);
 /// The longest time for which a look and the reading of a picture wait: a picture can be drawn instead.
 const LOOK_TIME: Duration = Duration::from_secs(5);
 
-/// Attempts to delete an object after the first.
-const DELETE_ATTEMPTS: u32 = 3;
+/// Attempts to delete or to create an object after the first.
+const ATTEMPTS_MORE: u32 = 3;
 
 /// The name of the object that marks a shared store, and its bytes.
 const MARK: &str = "meshsnap";
@@ -95,6 +99,15 @@ pub enum OpenError {
         address: String,
         /// The answer.
         cause: String,
+    },
+    /// It overwrites what must be created once.
+    #[error(
+        "the shared store {address} ignores the condition If-None-Match of writes, without which a job could end twice: \
+         --queue needs another store"
+    )]
+    Unconditional {
+        /// The address.
+        address: String,
     },
     /// The stored meshes of the data folder could not be put into it.
     #[error("{0}; the stored meshes of the data folder are to be put there")]
@@ -254,7 +267,7 @@ impl SharedStore {
         loop {
             match self.objects.delete(place).await {
                 Ok(()) | Err(object_store::Error::NotFound { .. }) => return Ok(()),
-                Err(_) if attempt < DELETE_ATTEMPTS => attempt += 1,
+                Err(_) if attempt < ATTEMPTS_MORE => attempt += 1,
                 Err(cause) => return Err(self.unavailable(cause)),
             }
         }

@@ -92,14 +92,14 @@ pub fn read_picture(object: Bytes) -> Option<Finished> {
     finished(record, content)
 }
 
-fn line_of(head: &impl Serialize) -> Bytes {
+pub(super) fn line_of(head: &impl Serialize) -> Bytes {
     // Structs of texts and numbers always have JSON.
     let mut line = serde_json::to_vec(head).unwrap_or_default();
     line.push(b'\n');
     line.into()
 }
 
-fn split<H: DeserializeOwned>(mut object: Bytes) -> Option<(H, Bytes)> {
+pub(super) fn split<H: DeserializeOwned>(mut object: Bytes) -> Option<(H, Bytes)> {
     let end = object.iter().position(|&byte| byte == b'\n')?;
     let line = object.split_to(end + 1);
     Some((serde_json::from_slice(&line).ok()?, object))

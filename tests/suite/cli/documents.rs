@@ -118,6 +118,8 @@ const OPERATIONS: &[(&str, Outcome)] = &[
     ("Authorization: Bearer choose-one", Draws("out.png", [512, 512])),
     ("AWS_ENDPOINT_URL", Elsewhere("the next one needs it")),
     ("meshsnap serve --store s3://", Elsewhere("`http::shared_store` does so")),
+    ("nats-server -js", Elsewhere("`http::shared_queue` does so")),
+    ("meshsnap serve --queue nats://", Elsewhere("`http::shared_queue` does so")),
 ];
 
 const PIPELINES: &[(&str, Outcome)] = &[

@@ -93,6 +93,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("server/pictures", &["server/cache", "server/memory", "server/jobs"]),
     ("server/store", &["server/jobs", "server/keys", "server/memory", "server/durable", "server/digest"]),
     ("server/shared_store", &["server/store", "server/jobs", "server/keys", "server/durable", "server/digest"]),
+    ("server/shared_queue", &["server/durable"]),
     ("server/webhooks", &["server/metrics"]),
     ("server/warm_up", &[]),
     (
@@ -108,6 +109,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "server/metrics",
             "server/store",
             "server/shared_store",
+            "server/shared_queue",
             "server/durable",
             "server/digest",
             "server/jobs",
@@ -194,6 +196,7 @@ const ONLY_UNDER: &[(&str, &[&str])] = &[
     ("redb::", &["server/durable/"]),
     ("prometheus::", &["server/metrics"]),
     ("object_store::", &["server/durable/", "server/shared_store/"]),
+    ("async_nats::", &["server/shared_queue/"]),
     ("quick_cache::", &["server/cache", "server/residents", "server/jobs/estimates"]),
     ("rustix::", &["program/sandbox/", "server/priority"]),
     ("landlock::", &["program/sandbox/"]),

@@ -15,6 +15,7 @@ pub mod mistakes;
 pub mod openapi;
 pub mod quality_target;
 pub mod schema;
+pub mod shared_queue;
 pub mod shared_store;
 pub mod sheets;
 pub mod verdicts;

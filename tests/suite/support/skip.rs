@@ -24,6 +24,8 @@ pub enum Need {
     Systemd,
     /// A C compiler, `cc`, on the `PATH`.
     Compiler,
+    /// `nats-server` on the `PATH`, and a later one, which `tests/run` installs into `target/python`.
+    Nats,
     /// Chromium on the `PATH`, and axe-core, which `tests/run` installs into `target/node`.
     Browser,
 }
@@ -40,6 +42,7 @@ impl Need {
             Self::Python => "python",
             Self::Systemd => "systemd",
             Self::Compiler => "compiler",
+            Self::Nats => "nats",
             Self::Browser => "browser",
         }
     }

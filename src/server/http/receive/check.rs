@@ -50,7 +50,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
             let pairs = keys.pairs().iter().cloned().chain([("kind".to_owned(), "check".to_owned())]);
             let query = Query { reading: reading.clone(), overrides: pairs.collect() };
             let digest = idempotency::digest(&query, &upload, &headers).await?;
-            match idempotency::check(state, name, digest)? {
+            match idempotency::check(state, name, digest).await? {
                 Sent::First(claim) => Some(claim),
                 Sent::Again(job) => return Ok(Asked::Known(job)),
             }

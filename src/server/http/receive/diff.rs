@@ -74,7 +74,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     let key = answer.key(&meshes.digests, &reading);
     let claim = match &sender.name {
         None => None,
-        Some(name) => match idempotency::check(state, name, Digest::of(key.as_bytes()))? {
+        Some(name) => match idempotency::check(state, name, Digest::of(key.as_bytes())).await? {
             Sent::First(claim) => Some(claim),
             Sent::Again(job) => return Ok(Asked::Known(job)),
         },

@@ -12,6 +12,7 @@ use crate::digest::Digest;
 use crate::http::dto::media_type;
 use crate::http::error::{ApiError, ErrorKind};
 use crate::http::negotiate;
+use crate::http::shared_jobs;
 use crate::http::state::AppState;
 use crate::jobs::{Claim, ClaimName, Job, Media, Named, Owner};
 use meshsnap_render::import::BundleFile;
@@ -45,22 +46,26 @@ pub fn name_of(headers: &HeaderMap, owner: &Owner) -> Result<Option<ClaimName>, 
     Ok(Some(ClaimName { owner: owner.clone(), key: key.into() }))
 }
 
-/// Finds out whether a request was sent before under its name.
-pub fn check(state: &AppState, name: &ClaimName, request: Digest) -> Result<Sent, ApiError> {
+/// Finds out whether a request was sent before under its name, to this server or to another of its service.
+pub async fn check(state: &AppState, name: &ClaimName, request: Digest) -> Result<Sent, ApiError> {
     match state.jobs.claim(name, request) {
-        Named::New(claim) => Ok(Sent::First(claim)),
+        Named::New(claim) => Ok(shared_jobs::sent_before(state, name, request).await?.unwrap_or(Sent::First(claim))),
         Named::Known(job) => Ok(Sent::Again(job)),
-        Named::Pending => {
-            let detail =
-                "a request with this Idempotency-Key is being accepted at this moment; send this one again shortly";
-            Err(ApiError::new(ErrorKind::Conflict, "idempotency_key_in_use", detail).retry_after(1))
-        }
-        Named::Other => {
-            let detail =
-                "this Idempotency-Key was sent with another request before; give each request a key of its own";
-            Err(ApiError::new(ErrorKind::Content, "idempotency_key_reused", detail))
-        }
+        Named::Pending => Err(in_use()),
+        Named::Other => Err(reused()),
     }
+}
+
+/// The error of a request that comes while the first one of its name is being accepted.
+pub fn in_use() -> ApiError {
+    let detail = "a request with this Idempotency-Key is being accepted at this moment; send this one again shortly";
+    ApiError::new(ErrorKind::Conflict, "idempotency_key_in_use", detail).retry_after(1)
+}
+
+/// The error of a request under the name of another one.
+pub fn reused() -> ApiError {
+    let detail = "this Idempotency-Key was sent with another request before; give each request a key of its own";
+    ApiError::new(ErrorKind::Content, "idempotency_key_reused", detail)
 }
 
 /// The name of one mesh of a form that brings several: the first has the name of the request itself, so that this stands

@@ -26,7 +26,7 @@ pub struct MeshOfForm {
 
 /// Reads the request of a form and makes work of each of its meshes. One that was accepted before, under the
 /// `Idempotency-Key` of the form, has its job.
-pub fn understand(
+pub async fn understand(
     state: &AppState,
     query: Query,
     upload: Upload,
@@ -46,7 +46,7 @@ pub fn understand(
         let claim = match named {
             None => None,
             Some((named, digest)) => {
-                match idempotency::check(state, &idempotency::name_of_mesh(named, index), digest)? {
+                match idempotency::check(state, &idempotency::name_of_mesh(named, index), digest).await? {
                     Sent::First(claim) => Some(claim),
                     Sent::Again(job) => {
                         meshes.push(MeshOfForm { name, job: Ok(job) });

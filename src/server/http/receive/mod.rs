@@ -81,10 +81,10 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
         None => None,
     };
     if upload.kind == BodyKind::Meshes {
-        return meshes::understand(state, query, upload, &headers, (&sender, named)).map(Reception::Many);
+        return meshes::understand(state, query, upload, &headers, (&sender, named)).await.map(Reception::Many);
     }
     let claim = match named {
-        Some((name, digest)) => match idempotency::check(state, name, digest)? {
+        Some((name, digest)) => match idempotency::check(state, name, digest).await? {
             Sent::First(claim) => Some(claim),
             Sent::Again(job) => return Ok(Reception::Known(job)),
         },

@@ -44,7 +44,10 @@ impl Sender {
         if is_short_json(headers) || is_sent_again {
             return Ok(());
         }
-        Ok(state.jobs.would_accept(class, &self.access.owner)?)
+        match state.shared_jobs.as_ref().filter(|_| class == Class::Batch) {
+            Some(shared) => shared.check(),
+            None => Ok(state.jobs.would_accept(class, &self.access.owner)?),
+        }
     }
 
     /// Work as this sender's.

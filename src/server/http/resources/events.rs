@@ -19,6 +19,7 @@ use crate::http::connection::activity::{Busy, Client};
 use crate::http::dto::JobDto;
 use crate::http::error::ApiError;
 use crate::http::event_streams::OpenStream;
+use crate::http::shared_jobs;
 use crate::http::state::AppState;
 use crate::jobs::{Job, JobState, Progress, Step};
 use crate::keys::Access;
@@ -61,12 +62,13 @@ pub async fn get(
     id: PathName,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let job = jobs::find(&state, &access, id)?;
+    let job = jobs::find(&state, &access, id).await?;
     let seen = headers.get(LAST_EVENT_ID).and_then(|id| id.to_str().ok()).map_or(Seen::Nothing, seen);
     if seen == Seen::End && job.state().is_final() {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
     let stream = state.event_streams.open(&access.owner)?;
+    shared_jobs::follow(&state, &job);
     let (states, progress) = job.watch();
     let busy = client.map(|Extension(ConnectInfo(client))| client.activity.begin());
     let following = Following { state, job, states, progress, seen, ready: VecDeque::new(), stream, _busy: busy };

@@ -26,6 +26,9 @@ pub async fn readyz(State(state): State<Arc<AppState>>) -> Result<Response, ApiE
     if state.shared.as_ref().is_some_and(|shared| shared.store.is_in_trouble()) {
         return Err(shared::unavailable());
     }
+    if let Some(jobs) = &state.shared_jobs {
+        jobs.check()?;
+    }
     let load = state.jobs.load();
     let detail = format!("{} workers do not end jobs whose time is up", load.overdue);
     if load.missing as u64 >= state.workers {

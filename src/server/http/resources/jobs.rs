@@ -14,6 +14,7 @@ use crate::http::error::{ApiError, ErrorKind};
 use crate::http::negotiate;
 use crate::http::receive::meshes::MeshOfForm;
 use crate::http::receive::{self, Reception};
+use crate::http::shared_jobs;
 use crate::http::state::AppState;
 use crate::jobs::{Class, Job, JobId, JobState};
 use crate::keys::Access;
@@ -34,7 +35,7 @@ pub async fn post(State(state): State<Arc<AppState>>, mut request: Request) -> R
         Kind::Diff => return diff::accept(&state, request).await,
     }
     match receive::receive(&state, request, Class::Batch).await? {
-        Reception::New(received) => Ok(responses::accepted(&*state.jobs.accept(received.work).await?)),
+        Reception::New(received) => Ok(responses::accepted(&*shared_jobs::accept(&state, received.work).await?)),
         Reception::Known(job) => Ok(responses::accepted(&job)),
         Reception::Many(meshes) => accept_all(&state, meshes).await,
     }
@@ -69,7 +70,7 @@ pub(super) async fn accept_all(state: &AppState, meshes: Vec<MeshOfForm>) -> Res
             Err(work) => works.push(*work),
         }
     }
-    let mut accepted = state.jobs.accept_all(works).await?.into_iter();
+    let mut accepted = shared_jobs::accept_all(state, works).await?.into_iter();
     let jobs = names.into_iter().enumerate().filter_map(|(index, name)| {
         let job = known.remove(&index).or_else(|| accepted.next())?;
         Some(JobOfMeshDto::new(name, &job))
@@ -86,9 +87,10 @@ pub async fn get(
     id: PathName,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let job = find(&state, &access, id)?;
+    let job = find(&state, &access, id).await?;
     let wait = negotiate::prefer(&headers).wait;
     if let Some(wait) = wait {
+        shared_jobs::follow(&state, &job);
         // A timeout is no error: the answer then says that the job has not ended.
         let _ = tokio::time::timeout(wait, job.ended()).await;
     }
@@ -108,7 +110,10 @@ pub async fn delete(
     Extension(access): Extension<Access>,
     id: PathName,
 ) -> Result<Response, ApiError> {
-    let job = find(&state, &access, id)?;
+    let job = find(&state, &access, id).await?;
+    if job.is_mirror() {
+        return Ok(responses::job_state(&*shared_jobs::delete(&state, job).await?));
+    }
     if job.state().is_final() {
         state.jobs.forget(&job);
     } else {
@@ -125,7 +130,7 @@ pub async fn result(
     Extension(access): Extension<Access>,
     id: PathName,
 ) -> Result<Response, ApiError> {
-    let job = find(&state, &access, id)?;
+    let job = find(&state, &access, id).await?;
     let conflict = |code, detail| ApiError::new(ErrorKind::Conflict, code, detail);
     let ended = job.state();
     if ended.is_final() {
@@ -144,8 +149,11 @@ pub async fn result(
 }
 
 /// The job, if this client sees it. Addresses are no identity: without keys, who knows the id may have it.
-pub(super) fn find(state: &AppState, access: &Access, id: PathName) -> Result<Arc<Job>, ApiError> {
-    let job = text_of(id).and_then(|id| JobId::parse(&id)).and_then(|id| state.jobs.find(id));
+pub(super) async fn find(state: &AppState, access: &Access, id: PathName) -> Result<Arc<Job>, ApiError> {
+    let job = match text_of(id).and_then(|id| JobId::parse(&id)) {
+        Some(id) => shared_jobs::find(state, id).await?,
+        None => None,
+    };
     let job = job.filter(|job| access.sees(&job.owner));
     job.ok_or_else(|| ApiError::not_found("there is no such job, or its result has expired"))
 }

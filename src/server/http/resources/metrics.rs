@@ -1,6 +1,7 @@
 //! `/metrics`: counters, gauges and histograms in the text format of Prometheus.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::extract::State;
 use axum::http::{HeaderValue, header};
@@ -13,9 +14,19 @@ use crate::memory::Account;
 use crate::metrics::{Gauges, MEDIA_TYPE};
 use crate::webhooks::Webhooks;
 
+/// The longest time for which the shared queue is asked for its load.
+const LOOK_TIME: Duration = Duration::from_secs(2);
+
 /// Everything that is counted.
 pub async fn get(State(state): State<Arc<AppState>>) -> Result<Response, ApiError> {
-    let text = state.metrics.text(&gauges(&state)).map_err(|error| {
+    let mut gauges = gauges(&state);
+    if let Some(jobs) = &state.shared_jobs
+        && let Ok(Some(load)) = tokio::time::timeout(LOOK_TIME, jobs.load()).await
+    {
+        gauges.shared_queue = vec![("jobs", load.jobs), ("webhooks", load.webhooks), ("redelivered", load.redelivered)];
+        gauges.shared_oldest_s = load.oldest.as_secs();
+    }
+    let text = state.metrics.text(&gauges).map_err(|error| {
         tracing::error!(%error, "the metrics cannot be written");
         ApiError::internal()
     })?;
@@ -52,6 +63,8 @@ fn gauges(state: &AppState) -> Gauges {
         ],
         gpu_losses: state.gpu.losses_in_all(),
         resident_bytes: resident_bytes(),
+        shared_queue: Vec::new(),
+        shared_oldest_s: 0,
     }
 }
 

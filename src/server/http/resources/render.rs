@@ -11,6 +11,7 @@ use crate::http::conditional;
 use crate::http::error::ApiError;
 use crate::http::negotiate;
 use crate::http::receive::{self, Received, Reception};
+use crate::http::shared_jobs;
 use crate::http::state::AppState;
 use crate::http::stored_mesh::shared;
 use crate::jobs::{Class, Job};
@@ -26,7 +27,7 @@ pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Resul
     };
     let Received { work, key, address, is_negotiated } = received;
     if respond_async {
-        return Ok(accepted(&*state.jobs.accept(work).await?));
+        return Ok(accepted(&*shared_jobs::accept(&state, work).await?));
     }
     let mesh = work.recipe.as_ref().and_then(|recipe| recipe.mesh);
     let drawing = run::draw(&state, work);

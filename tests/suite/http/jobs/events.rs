@@ -55,7 +55,7 @@ fn nested_cubes(count: usize) -> Vec<u8> {
 }
 
 /// Reads a stream to its end.
-fn read_all(server: &Server, job: &str, headers: &str) -> Answer {
+pub fn read_all(server: &Server, job: &str, headers: &str) -> Answer {
     let mut stream = server.connect();
     write!(stream, "GET {job}/events HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n{headers}\r\n").unwrap();
     let mut answer = Answer::read(&mut stream);

@@ -3,13 +3,13 @@
 
 pub mod disk;
 pub mod durable;
-mod events;
+pub mod events;
 mod idempotency;
 mod listing;
 mod several;
 #[cfg(feature = "otel")]
 mod traces;
-mod webhooks;
+pub mod webhooks;
 
 use std::io::Write as _;
 use std::time::{Duration, Instant};

@@ -16,17 +16,17 @@ use sha2::Sha256;
 
 use crate::support::server::{CUBE_OBJ, PATIENCE, Server, meshsnap};
 
-const SECRET: &str = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
+pub const SECRET: &str = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
 
 /// A receiver that takes what comes, or answers with 503, and passes on what it has heard.
-struct Hook {
-    address: String,
+pub struct Hook {
+    pub address: String,
     heard: Receiver<(bool, String)>,
     takes: Arc<AtomicBool>,
 }
 
 impl Hook {
-    fn new(takes: bool) -> Self {
+    pub fn new(takes: bool) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = format!("http://{}/hook", listener.local_addr().unwrap());
         let (takes, (sender, heard)) = (Arc::new(AtomicBool::new(takes)), channel());
@@ -52,8 +52,23 @@ impl Hook {
         Self { address, heard, takes }
     }
 
+    /// From now on it takes what comes, or refuses it.
+    pub fn set_takes(&self, takes: bool) {
+        self.takes.store(takes, Ordering::Relaxed);
+    }
+
+    /// Waits until it has refused something.
+    pub fn refused(&self) {
+        while self.heard.recv_timeout(PATIENCE).expect("something comes").0 {}
+    }
+
+    /// Checks that nothing comes for a while.
+    pub fn hears_nothing(&self, time: Duration) {
+        assert!(self.heard.recv_timeout(time).is_err());
+    }
+
     /// The next job that it has taken. Checks the signature.
-    fn taken(&self) -> Value {
+    pub fn taken(&self) -> Value {
         let began = Instant::now();
         while let Ok((takes, text)) = self.heard.recv_timeout(PATIENCE.saturating_sub(began.elapsed())) {
             check(&text);

@@ -43,6 +43,7 @@ struct Proxy {
     breaks: AtomicU32,
     /// Requests are taken, and no answer comes.
     is_mute: AtomicBool,
+    ignores_conditions: AtomicBool,
     delay_ms: AtomicU32,
     connections: AtomicU32,
     streams: Mutex<Vec<TcpStream>>,
@@ -136,6 +137,11 @@ impl Bucket {
         self.proxy.is_mute.store(true, Ordering::SeqCst);
     }
 
+    /// From now on, writes have no conditions any more.
+    pub fn ignore_conditions(&self) {
+        self.proxy.ignores_conditions.store(true, Ordering::SeqCst);
+    }
+
     /// Objects of which one byte is another now: those whose names begin with this.
     pub fn damage(&self, prefix: &str) -> usize {
         let names = self.names(prefix);
@@ -189,19 +195,22 @@ impl Proxy {
             client.shutdown(Shutdown::Both)?;
         }
         std::thread::scope(|scope| {
-            scope.spawn(|| self.copy(client, &server, 0));
-            self.copy(&server, client, self.delay_ms.load(Ordering::SeqCst));
+            scope.spawn(|| self.copy(client, &server, 0, true));
+            self.copy(&server, client, self.delay_ms.load(Ordering::SeqCst), false);
         });
         Ok(())
     }
 
     /// Copies until one side ends, then ends the other. Each piece waits first.
-    fn copy(&self, mut from: &TcpStream, mut to: &TcpStream, delay_ms: u32) {
+    fn copy(&self, mut from: &TcpStream, mut to: &TcpStream, delay_ms: u32, is_request: bool) {
         let mut buffer = vec![0; 1 << 16];
         while let Ok(count) = from.read(&mut buffer) {
             std::thread::sleep(Duration::from_millis(delay_ms.into()));
             while self.is_mute.load(Ordering::SeqCst) && !self.is_cut.load(Ordering::SeqCst) {
                 std::thread::sleep(Duration::from_millis(20));
+            }
+            if is_request && self.ignores_conditions.load(Ordering::SeqCst) {
+                forget_conditions(&mut buffer[..count]);
             }
             if count == 0 || to.write_all(&buffer[..count]).is_err() {
                 break;
@@ -209,5 +218,14 @@ impl Proxy {
         }
         let _ = to.shutdown(Shutdown::Both);
         let _ = from.shutdown(Shutdown::Both);
+    }
+}
+
+/// Gives the header of conditional writes another name.
+fn forget_conditions(request: &mut [u8]) {
+    let name = b"if-none-match";
+    let is_header = |part: &[u8]| part.eq_ignore_ascii_case(name);
+    if let Some(at) = request.windows(name.len()).position(is_header) {
+        request[at..at + name.len()].copy_from_slice(b"x-nothing-ask");
     }
 }

@@ -1,6 +1,6 @@
 //! Several servers with one shared store: what one stores, each of them finds, draws and deletes.
 
-mod bucket;
+pub mod bucket;
 
 use std::path::Path;
 use std::process::Command;
@@ -28,12 +28,12 @@ fn at_bucket(bucket: &Bucket, more: &[&str]) -> Command {
     command
 }
 
-fn of_folder(folder: &Path) -> String {
+pub fn of_folder(folder: &Path) -> String {
     format!("file://{}", folder.display())
 }
 
 /// Waits until something is true.
-fn wait(what: &str, mut is_true: impl FnMut() -> bool) {
+pub fn wait(what: &str, mut is_true: impl FnMut() -> bool) {
     let began = Instant::now();
     while !is_true() {
         assert!(began.elapsed() < PATIENCE, "{what}");

@@ -9,6 +9,7 @@ use axum::response::Response;
 use super::{responses, run};
 use crate::http::error::ApiError;
 use crate::http::receive::check::Asked;
+use crate::http::shared_jobs;
 use crate::http::state::AppState;
 use crate::pictures::Source;
 
@@ -29,7 +30,7 @@ async fn answer(state: &AppState, asked: Asked) -> Result<Response, ApiError> {
 /// The answer to a request for a job: always 202.
 async fn accepted(state: &AppState, asked: Asked) -> Result<Response, ApiError> {
     match asked {
-        Asked::New { work, .. } => Ok(responses::accepted(&*state.jobs.accept(*work).await?)),
+        Asked::New { work, .. } => Ok(responses::accepted(&*shared_jobs::accept(state, *work).await?)),
         Asked::Known(job) => Ok(responses::accepted(&job)),
     }
 }

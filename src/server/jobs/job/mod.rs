@@ -1,6 +1,8 @@
 //! One job: its work (a mesh and a task on it: draw, check, compare or report), its state from the queue to its end, and
 //! its result.
 
+mod mirror;
+
 use std::fmt;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -31,8 +33,16 @@ use meshsnap_render::warning::Warning;
 pub struct JobId(Uuid);
 
 impl JobId {
-    fn new() -> Self {
+    /// An id that was never given.
+    pub fn fresh() -> Self {
         Self(Uuid::now_v7())
+    }
+
+    /// The id that the first bytes of a digest name: a UUID of version 8.
+    pub fn of_digest(digest: Digest) -> Self {
+        let mut bytes = [0; 16];
+        bytes.copy_from_slice(&digest.as_bytes()[..16]);
+        Self(uuid::Builder::from_custom_bytes(bytes).into_uuid())
     }
 
     /// The id with this number.
@@ -384,7 +394,7 @@ pub struct Job {
     pub id: JobId,
     /// The job can be found by its id, also after its end.
     pub is_kept: bool,
-    /// How it waits.
+    /// How it waits: what can be found by its id is fetched later.
     pub class: Class,
     /// The party that asked for it.
     pub owner: Owner,
@@ -398,42 +408,44 @@ pub struct Job {
     pub accepted: Instant,
     /// Time of acceptance in milliseconds since 1970, for clients.
     pub accepted_unix_ms: u64,
+    /// It shows a job that is not this server's.
+    is_mirror: bool,
     /// Its record and its end are in the data folder.
-    pub(super) is_durable: bool,
+    pub(in crate::jobs) is_durable: bool,
     /// Number in the order of acceptance.
-    pub(super) serial: u64,
-    pub(super) size: Size,
+    pub(in crate::jobs) serial: u64,
+    pub(in crate::jobs) size: Size,
     /// The time for which it will occupy a worker, as far as is known.
-    pub(super) estimate: Duration,
+    pub(in crate::jobs) estimate: Duration,
     /// The memory with which a worker begins it, bytes. It grows once, if it turns out that others have what it needs.
-    pub(super) memory_bytes: AtomicU64,
+    pub(in crate::jobs) memory_bytes: AtomicU64,
     /// Its place in the queue: a time since the registry's beginning.
-    pub(super) rank: Duration,
-    pub(super) deadline: Deadline,
-    pub(super) state: watch::Sender<JobState>,
+    pub(in crate::jobs) rank: Duration,
+    pub(in crate::jobs) deadline: Deadline,
+    pub(in crate::jobs) state: watch::Sender<JobState>,
     /// How far it has come in this process.
-    pub(super) progress: watch::Sender<Progress>,
+    pub(in crate::jobs) progress: watch::Sender<Progress>,
     /// The name that the client gave its request.
-    pub(super) claim: Option<Arc<Claim>>,
+    pub(in crate::jobs) claim: Option<Arc<Claim>>,
     work: Mutex<Option<Work>>,
     /// Its bytes in the data folder.
     holds: Mutex<Vec<Arc<Hold>>>,
 }
 
 /// The size of a job, on which its estimate depends.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Size {
     /// The duration by the formula, seconds.
-    pub(super) formula_s: f64,
+    pub(in crate::jobs) formula_s: f64,
     /// The number of its kind.
-    pub(super) kind: usize,
+    pub(in crate::jobs) kind: usize,
     /// A hash of the mesh's key and the task, if the mesh is stored. Two that are equal by chance make an
     /// estimate worse, and nothing else.
-    pub(super) mesh: Option<u64>,
+    pub(in crate::jobs) mesh: Option<u64>,
     /// True for a mesh that was drawn before, and so is likely to be in memory.
-    pub(super) is_known: bool,
+    pub(in crate::jobs) is_known: bool,
     /// Bytes of memory by the formula.
-    pub(super) formula_bytes: f64,
+    pub(in crate::jobs) formula_bytes: f64,
 }
 
 /// A job that has ended in an earlier process.
@@ -452,6 +464,8 @@ pub struct Restored {
 pub struct Admission {
     /// The job can be found by its id.
     pub is_kept: bool,
+    /// How it waits.
+    pub class: Class,
     /// The party that asked for it.
     pub owner: Owner,
     /// It is in the data folder.
@@ -471,20 +485,21 @@ pub struct Admission {
 }
 
 impl Job {
-    pub(super) fn new(work: Option<Work>, admission: Admission, name: Option<(JobId, u64)>) -> Self {
-        let (id, accepted_unix_ms) = name.unwrap_or_else(|| (JobId::new(), unix_ms()));
-        let Admission { is_kept, owner, is_durable, serial, size, estimate, memory_bytes, rank, claim } = admission;
+    pub(in crate::jobs) fn new(work: Option<Work>, admission: Admission, name: Option<(JobId, u64)>) -> Self {
+        let (id, accepted_unix_ms) = name.unwrap_or_else(|| (JobId::fresh(), unix_ms()));
+        let Admission { is_kept, class, owner, is_durable, serial, size, estimate, memory_bytes, rank, claim } =
+            admission;
         Self {
             id,
             is_kept,
-            // What can be found by its id is fetched later.
-            class: if is_kept { Class::Batch } else { Class::Interactive },
+            class,
             owner,
             request_id: work.as_ref().map_or_else(|| "".into(), |work| work.request_id.clone()),
             trace: Trace::here(),
             webhook: work.as_ref().and_then(|work| work.webhook.clone()),
             accepted: Instant::now(),
             accepted_unix_ms,
+            is_mirror: false,
             is_durable,
             serial,
             size,
@@ -501,12 +516,12 @@ impl Job {
     }
 
     /// Looks at the work. None if it was taken.
-    pub(super) fn with_work<T>(&self, look: impl FnOnce(&Work) -> T) -> Option<T> {
+    pub(in crate::jobs) fn with_work<T>(&self, look: impl FnOnce(&Work) -> T) -> Option<T> {
         self.work.lock().unwrap_or_else(PoisonError::into_inner).as_ref().map(look)
     }
 
     /// Replaces the bytes that it holds in the data folder, and returns those that it held.
-    pub(super) fn hold(&self, holds: Vec<Arc<Hold>>) -> Vec<Arc<Hold>> {
+    pub(in crate::jobs) fn hold(&self, holds: Vec<Arc<Hold>>) -> Vec<Arc<Hold>> {
         std::mem::replace(&mut self.holds.lock().unwrap_or_else(PoisonError::into_inner), holds)
     }
 
@@ -516,7 +531,7 @@ impl Job {
     }
 
     /// A worker begins with it.
-    pub(super) fn begin(&self, task: &Task) {
+    pub(in crate::jobs) fn begin(&self, task: &Task) {
         let views = match task {
             Task::Draw(spec) => spec.sheet.as_ref().map_or(1, |sheet| sheet.count()),
             Task::Inspect { .. } | Task::Check(_) | Task::Diff(_) => 0,
@@ -540,12 +555,12 @@ impl Job {
     }
 
     /// Gives the work back that a worker has taken, and could not do.
-    pub(super) fn put_work(&self, work: Work) {
+    pub(in crate::jobs) fn put_work(&self, work: Work) {
         *self.work.lock().unwrap_or_else(PoisonError::into_inner) = Some(work);
     }
 
     /// Takes the work out of the job. None if it was taken before.
-    pub(super) fn take_work(&self) -> Option<Work> {
+    pub(in crate::jobs) fn take_work(&self) -> Option<Work> {
         self.work.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }

@@ -1,0 +1,146 @@
+//! The acceptance of jobs of a service: their objects first, then their messages. What fails before its answer
+//! is taken back; what a crash leaves behind is found by the sweep.
+
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::sync::Arc;
+
+use futures_util::{StreamExt as _, TryStreamExt as _, stream};
+
+use super::service::SharedJobs;
+use crate::digest::Digest;
+use crate::durable::{JobKey, JobRecord};
+use crate::http::error::ApiError;
+use crate::http::receive::idempotency::{self, Sent};
+use crate::http::state::AppState;
+use crate::jobs::{ClaimName, Job, JobId, JobState, Progress, Refusal, Restored, Work, record_of, unix_ms};
+use crate::shared_queue::{Kind, Note};
+use crate::shared_store::AcceptedJob;
+
+/// Objects that are written at a time.
+const WRITES: usize = 8;
+
+/// Accepts a job: durably, where there is a data folder or a shared queue.
+pub async fn accept(state: &AppState, work: Work) -> Result<Arc<Job>, ApiError> {
+    accept_all(state, vec![work]).await?.pop().ok_or_else(ApiError::internal)
+}
+
+/// Accepts several jobs of one owner: all of them or none.
+pub async fn accept_all(state: &AppState, works: Vec<Work>) -> Result<Vec<Arc<Job>>, ApiError> {
+    let Some(shared) = &state.shared_jobs else { return Ok(state.jobs.accept_all(works).await?) };
+    if state.is_draining() {
+        return Err(Refusal::Draining.into());
+    }
+    works.iter().try_for_each(|work| state.jobs.check_mesh(work))?;
+    shared.check()?;
+    let shared = shared.clone();
+    // It goes on when the client hangs up, so that a form is accepted as a whole.
+    let accepting = tokio::spawn(async move {
+        let accepted = shared.accept(works).await;
+        accepted.map(|records| records.iter().map(|record| Arc::new(queued(record))).collect())
+    });
+    accepting.await.unwrap_or_else(|_| Err(ApiError::internal()))
+}
+
+/// The job of a request that was sent before under its name; None if it was not.
+pub async fn sent_before(state: &AppState, name: &ClaimName, request: Digest) -> Result<Option<Sent>, ApiError> {
+    let Some(shared) = &state.shared_jobs else { return Ok(None) };
+    let Some((job, claim)) = shared.look_up_stored(&state.memory, id_of(name)).await? else { return Ok(None) };
+    match claim.is_some_and(|claim| claim.request == request) {
+        true => Ok(Some(Sent::Again(Arc::new(job)))),
+        false => Err(idempotency::reused()),
+    }
+}
+
+/// The id of a job whose request has a name: two servers that get it at the same time give its job the same id.
+fn id_of(name: &ClaimName) -> JobId {
+    let owner = Digest::of(name.owner.to_string().as_bytes());
+    JobId::of_digest(Digest::of(format!("{owner} {}", name.key).as_bytes()))
+}
+
+fn queued(record: &JobRecord) -> Job {
+    let id = JobId::from_key(record.key);
+    let owner = crate::jobs::Owner::new(&record.owner);
+    let name = Restored { id, accepted_unix_ms: record.accepted_unix_ms, owner, claim: None };
+    Job::mirror_of(name, JobState::Queued, Progress::default())
+}
+
+impl SharedJobs {
+    async fn accept(self: Arc<Self>, works: Vec<Work>) -> Result<Vec<JobRecord>, ApiError> {
+        // Hashing many bytes would block other requests. The works keep the memory of their bytes until all is written.
+        let reading = tokio::task::spawn_blocking(move || {
+            let jobs: Vec<Arc<AcceptedJob>> = works.iter().map(|work| Arc::new(read(work))).collect();
+            (works, jobs)
+        });
+        let (works, jobs) = reading.await.map_err(|_| ApiError::internal())?;
+        let written = self.write(&jobs).await;
+        drop(works);
+        if let Err((error, undone)) = written {
+            for key in undone {
+                // Without its object, a message means nothing.
+                if let Err(error) = self.store.delete_job(key).await {
+                    tracing::warn!(%error, "a job that was refused may be done all the same");
+                }
+                let _ = self.queue.set_note(key, &Note { has_ended: true, ..Note::default() }).await;
+            }
+            return Err(error);
+        }
+        for job in &jobs {
+            let (job, request_id) = (JobId::from_key(job.record.key), &*job.record.request_id);
+            tracing::info!(%job, request_id, "a job was accepted for the shared queue");
+        }
+        Ok(jobs.iter().map(|job| job.record.clone()).collect())
+    }
+
+    /// Writes the objects and the messages of jobs. After an error, the jobs whose objects were written are to be undone.
+    async fn write(self: &Arc<Self>, jobs: &[Arc<AcceptedJob>]) -> Result<(), (ApiError, Vec<JobKey>)> {
+        let objects = stream::iter(jobs.to_vec()).map(|job| {
+            let shared = self.clone();
+            async move { (job.record.key, shared.store.create_job(&job).await) }
+        });
+        let written: Vec<_> = objects.buffered(WRITES).collect().await;
+        // After an error, it may have been written all the same, or be another's: it stays.
+        let ours = written.iter().filter(|(_, created)| matches!(created, Ok(true))).map(|(key, _)| *key).collect();
+        for (_, created) in written {
+            match created {
+                Ok(true) => {}
+                Ok(false) => return Err((idempotency::in_use(), ours)),
+                Err(error) => return Err((error.into(), ours)),
+            }
+        }
+        let messages = stream::iter(jobs.to_vec()).map(|job| {
+            let shared = self.clone();
+            async move { shared.announce(&job).await }
+        });
+        messages.buffered(WRITES).try_collect::<()>().await.map_err(|error| (error, ours))
+    }
+
+    async fn announce(&self, job: &AcceptedJob) -> Result<(), ApiError> {
+        let (key, record) = (job.record.key, &job.record);
+        let accepted_unix_ms = record.accepted_unix_ms;
+        self.queue.set_note(key, &note_of(record)).await?;
+        Ok(self.queue.send(Kind::Job, key, &message_name(key, accepted_unix_ms)).await?)
+    }
+}
+
+/// The note on a job that waits.
+pub fn note_of(record: &JobRecord) -> Note {
+    Note { owner: record.owner.clone(), accepted_unix_ms: record.accepted_unix_ms, ..Note::default() }
+}
+
+/// The name under which JetStream knows a message that is sent twice. A job that is sent again to the queue has another.
+pub fn message_name(key: JobKey, unix_ms: u64) -> String {
+    format!("{key:032x} {unix_ms}")
+}
+
+/// The job as it is stored. A mesh that is stored is not copied into it.
+fn read(work: &Work) -> AcceptedJob {
+    let mut blobs = BTreeMap::new();
+    let id = work.claim.as_ref().map_or_else(JobId::fresh, |claim| id_of(&claim.name));
+    let Ok(record) = record_of((id, unix_ms()), work, false, &mut |bytes, _| {
+        let digest = Digest::of(bytes);
+        blobs.insert(digest, bytes.clone());
+        Ok::<_, Infallible>(digest)
+    });
+    AcceptedJob { record, blobs }
+}

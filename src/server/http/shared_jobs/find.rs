@@ -1,0 +1,145 @@
+//! What clients are told of the jobs of a service: mirrors, which show what the queue and the store know of a job at the
+//! time, and follow it for as long as somebody holds them.
+
+use std::sync::{Arc, Weak};
+use std::time::Duration;
+
+use super::service::SharedJobs;
+use crate::durable::ClaimRecord;
+use crate::http::error::ApiError;
+use crate::http::state::AppState;
+use crate::jobs::{Job, JobId, JobState, Owner, Progress, Restored, Step, read_end};
+use crate::memory::Memory;
+use crate::shared_queue::Note;
+use crate::shared_store::EndedJob;
+
+/// The longest time between two looks at a job that is followed: a note about it may be missed.
+const LOOK_EVERY: Duration = Duration::from_secs(2);
+
+/// A job that this server has, or else a mirror of one of its service.
+pub async fn find(state: &AppState, id: JobId) -> Result<Option<Arc<Job>>, ApiError> {
+    if let Some(job) = state.jobs.find(id) {
+        return Ok(Some(job));
+    }
+    let Some(shared) = &state.shared_jobs else { return Ok(None) };
+    Ok(shared.look_up(&state.memory, id).await?.map(Arc::new))
+}
+
+/// Lets a mirror follow its job until it has ended, or nobody holds the mirror any more.
+pub fn follow(state: &Arc<AppState>, job: &Arc<Job>) {
+    if let Some(shared) = state.shared_jobs.clone().filter(|_| job.is_mirror() && !job.state().is_final()) {
+        tokio::spawn(shared.follow(state.memory.clone(), Arc::downgrade(job), job.id));
+    }
+}
+
+/// Cancels a job of the service that has not ended, or forgets one that has. The job as it is then.
+pub async fn delete(state: &AppState, job: Arc<Job>) -> Result<Arc<Job>, ApiError> {
+    let Some(shared) = &state.shared_jobs else { return Ok(job) };
+    let key = job.id.key();
+    if job.state().is_final() {
+        shared.store.delete_end(key).await?;
+        return Ok(job);
+    }
+    if let Some(record) = shared.store.job_record(key).await? {
+        shared.end(&record, &JobState::Cancelled).await?;
+    }
+    // It may have ended in another way at the same moment.
+    Ok(shared.look_up(&state.memory, job.id).await?.map_or(job, Arc::new))
+}
+
+impl SharedJobs {
+    /// A mirror of a job. None if there is no such job, or its end has expired.
+    pub(super) async fn look_up(&self, memory: &Arc<Memory>, id: JobId) -> Result<Option<Job>, ApiError> {
+        // Without the queue, the store knows enough.
+        if let Some(note) = self.queue.note(id.key()).await.ok().flatten().filter(|note| !note.has_ended) {
+            let (state, progress) = shown_by(&note);
+            return Ok(Some(mirror(id, (&note.owner, note.accepted_unix_ms), state, progress)));
+        }
+        Ok(self.look_up_stored(memory, id).await?.map(|(job, _)| job))
+    }
+
+    /// A mirror of a job by the store alone, and the name of the job's request.
+    pub(super) async fn look_up_stored(
+        &self,
+        memory: &Arc<Memory>,
+        id: JobId,
+    ) -> Result<Option<(Job, Option<ClaimRecord>)>, ApiError> {
+        if let Some(found) = self.look_up_end(memory, id).await? {
+            return Ok(Some(found));
+        }
+        match self.store.job_record(id.key()).await? {
+            Some(record) => {
+                let (owner, at) = (&record.owner, record.accepted_unix_ms);
+                Ok(Some((mirror(id, (owner, at), JobState::Queued, Progress::default()), record.claim)))
+            }
+            // It may have ended since.
+            None => self.look_up_end(memory, id).await,
+        }
+    }
+
+    async fn look_up_end(
+        &self,
+        memory: &Arc<Memory>,
+        id: JobId,
+    ) -> Result<Option<(Job, Option<ClaimRecord>)>, ApiError> {
+        let Some((ended, content)) = self.store.end(id.key()).await? else { return Ok(None) };
+        let EndedJob { owner, accepted_unix_ms, claim, end, .. } = ended;
+        let state = read_end(&end, Some(content), memory);
+        Ok(Some((mirror(id, (&owner, accepted_unix_ms), state, DRAWN), claim)))
+    }
+
+    async fn follow(self: Arc<Self>, memory: Arc<Memory>, job: Weak<Job>, id: JobId) {
+        let mut notes = None;
+        loop {
+            if notes.is_none() {
+                notes = self.queue.follow(id.key()).await.ok();
+            }
+            // After it has begun to listen, so that nothing is missed.
+            let found = self.look_up(&memory, id).await;
+            let Some(mirror) = job.upgrade() else { return };
+            match found {
+                Ok(Some(found)) => {
+                    let progress = *found.watch().1.borrow();
+                    mirror.mirror(found.state(), progress);
+                }
+                // It was cancelled and forgotten meanwhile.
+                Ok(None) => mirror.mirror(JobState::Cancelled, Progress::default()),
+                // The next look may succeed.
+                Err(_) => {}
+            }
+            if mirror.state().is_final() {
+                return;
+            }
+            drop(mirror);
+            let note = async {
+                match &mut notes {
+                    Some(notes) => notes.next().await,
+                    None => std::future::pending().await,
+                }
+            };
+            match tokio::time::timeout(LOOK_EVERY, note).await {
+                Ok(Some(note)) if !note.has_ended => {
+                    let Some(mirror) = job.upgrade() else { return };
+                    let (state, progress) = shown_by(&note);
+                    mirror.mirror(state, progress);
+                }
+                Ok(None) => notes = None,
+                _ => {}
+            }
+        }
+    }
+}
+
+fn mirror(id: JobId, (owner, accepted_unix_ms): (&str, u64), state: JobState, progress: Progress) -> Job {
+    let owner = Owner::new(owner);
+    Job::mirror_of(Restored { id, accepted_unix_ms, owner, claim: None }, state, progress)
+}
+
+/// The progress of a job that has ended, of which nobody asks for the steps any more.
+const DRAWN: Progress = Progress { step: Step::Encoding, drawn: 0, views: 0 };
+
+/// The state and the progress of a job that has not ended.
+fn shown_by(note: &Note) -> (JobState, Progress) {
+    let state = if note.is_running { JobState::Running } else { JobState::Queued };
+    (state, Progress { step: Step::of_name(&note.step), drawn: note.drawn, views: note.views })
+}

@@ -1,0 +1,312 @@
+//! Takes jobs from the shared queue and lets this daemon's workers do them. The message of a job is acknowledged once the
+//! job's end is stored. A daemon that stops before that, however it stops, leaves the message to another.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::OwnedSemaphorePermit;
+
+use super::accept::note_of;
+use super::service::{SharedJobs, id_of};
+use crate::durable::{FileRecord, JobKey, JobRecord};
+use crate::http::address::render_key;
+use crate::http::error::{ApiError, record_of};
+use crate::http::recovery::{self, Side};
+use crate::http::state::AppState;
+use crate::http::stored_mesh;
+use crate::jobs::{Failure, Job, JobState, Owner, Task, Work};
+use crate::keys::Access;
+use crate::memory::Account;
+use crate::shared_queue::{Delivery, Kind, Note, SIGN_EVERY};
+use crate::shared_store::{AcceptedJob, FoundJob};
+use meshsnap_render::import::BundleFile;
+
+/// How often a job may be begun by daemons that then stopped.
+const STARTS_MAX: u32 = 5;
+
+/// Pause after a failure of the queue or the store.
+const PAUSE: Duration = Duration::from_secs(1);
+
+/// Time after which a job is taken again whose picture another daemon draws at this moment.
+const SAME_PICTURE: Duration = Duration::from_millis(300);
+
+/// Time for which no other daemon draws a picture that this one draws; it is renewed with each sign of life.
+const LEASE: Duration = Duration::from_secs(20);
+
+/// Time between two looks at how far a job has come.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+
+/// The reason why a job is not done now, by this daemon: it is given back to the queue for a while.
+struct Later(Duration);
+
+/// What is to be done with a job.
+enum Ready {
+    /// A worker is to do it.
+    Work(Box<Work>),
+    /// It has ended without one.
+    Ended(JobState),
+}
+
+/// Takes jobs until the server drains.
+pub async fn run(shared: Arc<SharedJobs>, state: Arc<AppState>) {
+    while let Ok(permit) = shared.slots.clone().acquire_owned().await {
+        if state.is_draining() {
+            return;
+        }
+        match shared.queue.take(Kind::Job).await {
+            Ok(None) => {}
+            Ok(Some(delivery)) => {
+                tokio::spawn(shared.clone().serve(state.clone(), delivery, permit));
+            }
+            Err(error) => {
+                tracing::warn!(%error, "no job was taken");
+                tokio::time::sleep(PAUSE).await;
+            }
+        }
+    }
+}
+
+impl SharedJobs {
+    /// Does the job of a message, and gives signs of life meanwhile.
+    async fn serve(self: Arc<Self>, state: Arc<AppState>, delivery: Delivery, _permit: OwnedSemaphorePermit) {
+        let Some(key) = delivery.key() else { return delivery.end().await };
+        let doing = self.attend(&state, key);
+        tokio::pin!(doing);
+        let done = loop {
+            match tokio::time::timeout(SIGN_EVERY, &mut doing).await {
+                Ok(done) => break done,
+                Err(_) => delivery.sign_of_life().await,
+            }
+        };
+        match done {
+            Ok(()) => delivery.end().await,
+            Err(Later(pause)) => delivery.give_back(pause).await,
+        }
+    }
+
+    /// Does a job, unless it has ended. When this returns Ok, its end is stored.
+    async fn attend(&self, state: &Arc<AppState>, key: JobKey) -> Result<(), Later> {
+        if state.is_draining() {
+            return Err(Later(Duration::ZERO));
+        }
+        let note = self.queue.note(key).await.map_err(|_| Later(PAUSE))?;
+        let is_new = note.as_ref().is_some_and(|note| note.starts == 0 && !note.has_ended);
+        if !is_new && let Some((ended, _)) = self.store.end(key).await.map_err(later)? {
+            return self.tell(key, ended.webhook.is_some()).await.map_err(later);
+        }
+        let memory = state.memory.share(Account::Uploads);
+        let mut admit = |bytes| memory.grow(bytes).is_ok();
+        let job = match self.store.job(key, &mut admit).await.map_err(later)? {
+            FoundJob::Job(job) => *job,
+            FoundJob::NoRoom => return Err(Later(PAUSE)),
+            // It was taken back, cancelled, or has ended and was forgotten.
+            FoundJob::None => return self.tell(key, false).await.map_err(later),
+            FoundJob::Damaged => {
+                let Ok(Some(record)) = self.store.job_record(key).await else { return Err(Later(PAUSE)) };
+                return self.end_surely(state, &record, failed(Failure::Lost)).await;
+            }
+        };
+        // From here on, the work counts its bytes.
+        drop(memory);
+        let note = Note { starts: note.map_or(0, |note| note.starts), ..note_of(&job.record) };
+        let ended = match self.ready(state, &job, &note).await? {
+            Ready::Ended(ended) => ended,
+            Ready::Work(work) => self.work(state, &job.record, *work, note).await?,
+        };
+        self.end_surely(state, &job.record, ended).await
+    }
+
+    /// The work of a job; its end, if that is known without one.
+    async fn ready(&self, state: &AppState, job: &AcceptedJob, note: &Note) -> Result<Ready, Later> {
+        if note.starts >= STARTS_MAX {
+            return Ok(Ready::Ended(failed(Failure::Crashed { times: note.starts })));
+        }
+        let work = match work_of(state, job).await {
+            Ok(work) => work,
+            Err(Unready::Later(pause)) => return Err(Later(pause)),
+            Err(Unready::Failed(failure)) => return Ok(Ready::Ended(failed(failure))),
+        };
+        match state.jobs.check_mesh(&work) {
+            Ok(()) => Ok(Ready::Work(Box::new(work))),
+            Err(refusal) => Ok(Ready::Ended(failed(Failure::Recorded(record_of(refusal.into()))))),
+        }
+    }
+
+    /// The end of a job that a worker does. A picture of a stored mesh that was drawn already, by whichever daemon, is
+    /// not drawn again.
+    async fn work(&self, state: &Arc<AppState>, record: &JobRecord, work: Work, note: Note) -> Result<JobState, Later> {
+        let picture = match (&work.task, record.mesh) {
+            (Task::Draw(spec), Some(mesh)) => {
+                let reading = recovery::reading(record.format_in.as_deref(), record.entry.clone());
+                Some((mesh, render_key(state, mesh, &reading, spec)))
+            }
+            _ => None,
+        };
+        let Some((mesh, key)) = picture else { return self.draw(state, record, work, note, None).await };
+        if let Some(drawn) = self.drawn(state, (mesh, &key)).await {
+            return Ok(drawn);
+        }
+        let lease = crate::digest::Digest::of(key.as_bytes()).to_string();
+        let holder = format!("{} {:032x}", self.server, record.key);
+        if !self.queue.lease(&lease, &holder, LEASE).await.map_err(|_| Later(PAUSE))? {
+            return Err(Later(SAME_PICTURE));
+        }
+        // It may have been drawn since the first look.
+        let ended = match self.drawn(state, (mesh, &key)).await {
+            Some(drawn) => Ok(drawn),
+            None => self.draw(state, record, work, note, Some((&lease, &holder))).await,
+        };
+        if let Ok(JobState::Done(finished)) = &ended
+            && !finished.is_substitute
+            && let Err(error) = self.store.put_picture(mesh, &key, finished).await
+        {
+            tracing::warn!(%error, "a picture was not stored");
+        }
+        self.queue.release(&lease).await;
+        ended
+    }
+
+    async fn drawn(&self, state: &AppState, (mesh, key): (crate::digest::Digest, &str)) -> Option<JobState> {
+        let picture = self.store.picture(mesh, key).await.ok().flatten()?;
+        state.metrics.picture("shared");
+        Some(JobState::Done(Arc::new(picture.counted(&state.memory))))
+    }
+
+    /// Lets a worker of this daemon do a job, and notes how far it comes.
+    async fn draw(
+        &self,
+        state: &Arc<AppState>,
+        record: &JobRecord,
+        work: Work,
+        mut note: Note,
+        lease: Option<(&str, &str)>,
+    ) -> Result<JobState, Later> {
+        let key = record.key;
+        // Its webhook is told by the service.
+        let work = Work { webhook: None, ..work };
+        let job = Waiting { job: state.jobs.do_shared((id_of(key), record.accepted_unix_ms), work), state };
+        let mut cancelled = self.queue.follow(key).await.map_err(|_| Later(PAUSE))?;
+        let mut looks: u32 = 0;
+        loop {
+            let ended = tokio::select! {
+                ended = tokio::time::timeout(LOOK_EVERY, job.job.ended()) => ended.ok(),
+                Some(note) = cancelled.next() => note.has_ended.then_some(JobState::Cancelled),
+            };
+            if let Some(ended) = ended {
+                return Ok(ended);
+            }
+            let shown = note_on(&job.job, &note);
+            if !shown.is_running && state.is_draining() {
+                return Err(Later(Duration::ZERO));
+            }
+            if shown != note {
+                let _ = self.queue.set_note(key, &shown).await;
+                note = shown;
+            }
+            looks += 1;
+            if let Some((lease, holder)) = lease.filter(|_| looks.is_multiple_of(LOOKS_PER_LEASE)) {
+                let _ = self.queue.lease(lease, holder, LEASE).await;
+            }
+        }
+    }
+
+    /// Ends a job, however long the store or the queue cannot be reached.
+    async fn end_surely(&self, state: &AppState, record: &JobRecord, ended: JobState) -> Result<(), Later> {
+        while let Err(error) = self.end(record, &ended).await {
+            tracing::warn!(%error, job = %id_of(record.key), "the end of a job is not stored and told yet");
+            if state.is_draining() {
+                return Err(Later(Duration::ZERO));
+            }
+            tokio::time::sleep(PAUSE).await;
+        }
+        Ok(())
+    }
+}
+
+/// Looks at a job after which the lease of its picture is renewed: every five seconds.
+const LOOKS_PER_LEASE: u32 = 50;
+
+/// A job of this daemon's workers that is given up when nobody waits for it any more.
+struct Waiting<'s> {
+    job: Arc<Job>,
+    state: &'s AppState,
+}
+
+impl Drop for Waiting<'_> {
+    fn drop(&mut self) {
+        self.state.jobs.cancel(&self.job);
+    }
+}
+
+/// The note on a job at this moment.
+fn note_on(job: &Job, before: &Note) -> Note {
+    let is_running = matches!(job.state(), JobState::Running);
+    let progress = *job.watch().1.borrow();
+    Note {
+        is_running,
+        starts: before.starts + u32::from(is_running && !before.is_running),
+        step: progress.step.name().to_owned(),
+        drawn: progress.drawn,
+        views: progress.views,
+        ..before.clone()
+    }
+}
+
+/// Reasons why there is no work.
+enum Unready {
+    Later(Duration),
+    Failed(Failure),
+}
+
+/// The work of a job: its request is read again, and the stored meshes that it names are found.
+async fn work_of(state: &AppState, job: &AcceptedJob) -> Result<Work, Unready> {
+    let record = &job.record;
+    let lost = || Unready::Failed(Failure::Lost);
+    let older = side(state, job, (&record.files, record.is_zip, record.mesh)).await?;
+    let newer = match &record.newer {
+        Some(newer) => Some(side(state, job, (&newer.files, newer.is_zip, newer.mesh)).await?),
+        None => None,
+    };
+    let document = match record.request.document {
+        Some(digest) => Some(job.blobs.get(&digest).cloned().ok_or_else(lost)?),
+        None => None,
+    };
+    recovery::work_of(state, record, document, older, newer).map_err(Unready::Failed)
+}
+
+/// A mesh of a job: a stored one, or one that came with the request.
+async fn side(
+    state: &AppState,
+    job: &AcceptedJob,
+    (files, is_zip, mesh): (&[FileRecord], bool, Option<crate::digest::Digest>),
+) -> Result<Side, Unready> {
+    if let Some(digest) = mesh {
+        let access = Access::of_job(Owner::new(&job.record.owner));
+        let stored = stored_mesh::find(state, Some(&digest.to_string()), &access).await.map_err(unready)?;
+        let (bundle, memory, holds) = (stored.mesh.bundle.clone(), stored.memory.clone(), stored.holds.clone());
+        return Ok(Side { bundle, memory, holds });
+    }
+    let found = files.iter().map(|file| {
+        let bytes = job.blobs.get(&file.digest)?.clone();
+        Some(BundleFile { path: file.path.clone(), bytes })
+    });
+    let files = found.collect::<Option<Vec<_>>>().ok_or(Unready::Failed(Failure::Lost))?;
+    Ok(Side::sent(state, files, is_zip, Vec::new()))
+}
+
+/// A mesh that is deleted fails its job; a store that cannot be reached, or memory that is short, passes.
+fn unready(error: ApiError) -> Unready {
+    if error.may_pass() {
+        return Unready::Later(PAUSE);
+    }
+    Unready::Failed(Failure::Recorded(record_of(error)))
+}
+
+fn failed(failure: Failure) -> JobState {
+    JobState::Failed(Arc::new(failure))
+}
+
+fn later(error: impl std::fmt::Display) -> Later {
+    tracing::warn!(%error, "a job is done later");
+    Later(PAUSE)
+}

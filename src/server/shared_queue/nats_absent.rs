@@ -1,0 +1,102 @@
+//! The stand-in for `nats.rs` in builds without the feature `cluster`: a queue that cannot be opened.
+
+use super::{AddressError, Kind, Note, OpenError, QueueError, QueueLoad, QueueSettings};
+use crate::durable::JobKey;
+use std::collections::HashSet;
+use std::convert::Infallible;
+use std::time::Duration;
+
+/// No queue.
+pub struct SharedQueue(Infallible);
+
+/// No message.
+pub struct Delivery(Infallible);
+
+/// No notes.
+pub struct Following(Infallible);
+
+impl SharedQueue {
+    /// An error: there is no NATS.
+    pub async fn open(_: QueueSettings) -> Result<Self, OpenError> {
+        Err(AddressError::Absent.into())
+    }
+
+    /// Unreachable, as all that follows.
+    pub fn is_connected(&self) -> bool {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn send(&self, _: Kind, _: JobKey, _: &str) -> Result<(), QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn take(&self, _: Kind) -> Result<Option<Delivery>, QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn live(&self, _: Kind) -> Result<HashSet<JobKey>, QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn note(&self, _: JobKey) -> Result<Option<Note>, QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn set_note(&self, _: JobKey, _: &Note) -> Result<(), QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn follow(&self, _: JobKey) -> Result<Following, QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn lease(&self, _: &str, _: &str, _: Duration) -> Result<bool, QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn release(&self, _: &str) {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn load(&self) -> Result<QueueLoad, QueueError> {
+        match self.0 {}
+    }
+}
+
+impl Following {
+    /// Unreachable.
+    pub async fn next(&mut self) -> Option<Note> {
+        match self.0 {}
+    }
+}
+
+impl Delivery {
+    /// Unreachable.
+    pub fn key(&self) -> Option<JobKey> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn sign_of_life(&self) {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn give_back(&self, _: Duration) {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn end(&self) {
+        match self.0 {}
+    }
+}
