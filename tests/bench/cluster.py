@@ -7,7 +7,8 @@ is alone draws.
     tests/bench/cluster.py partition    # servers in namespaces of their own are cut off for 5 to 40 s (needs root)
     tests/bench/cluster.py slow-store   # a bucket whose answers take 2 s, and one of twenty of which is an error
     tests/bench/cluster.py duplicates   # 1,000 clients want 50 pictures
-    tests/bench/cluster.py scaling      # 1, 2 and 4 servers, each with half a core; and what the queue costs per job
+    tests/bench/cluster.py scaling      # 1, 2 and 4 servers, each with half a core; and what the queue costs per job.
+                                        # With --share .2, four of them leave 2 cores something for NATS and the client
 
 Options: --binary target/release/meshsnap, --jobs N, --seconds N, --nodes N, --nats nats-server, --keep FOLDER (logs stay there).
 `slow-store` needs moto, which tests/run installs: run it by target/python/bin/python.
@@ -86,7 +87,9 @@ class Server:
         self.start()
 
     def start(self):
-        command = self.prefix + [self.options.binary, "serve", "--listen", self.listen, "--backend", "cpu", "--ephemeral"]
+        command = self.prefix + [self.options.binary, "serve", "--listen", self.listen, "--backend", "cpu"]
+        if "--data-dir" not in self.arguments:
+            command.append("--ephemeral")
         environment = {**os.environ, "MESHSNAP_LOG": "info", **self.environment}
         self.process = subprocess.Popen(command + self.arguments, stdout=subprocess.PIPE, stderr=open(self.log, "ab"),
                                         env=environment, text=True)
@@ -238,7 +241,219 @@ def kills(options):
     return check(options, servers, dict(sorted(jobs.items())), 180)
 
 
-RUNS = {"kills": kills}
+def many(servers, jobs, path=None, clients=16):
+    """Sends jobs as fast as they are accepted. Their addresses by number."""
+    with concurrent.futures.ThreadPoolExecutor(clients) as pool:
+        return dict(enumerate(pool.map(lambda number: submit(servers, number, path=path), range(jobs))))
+
+
+def duplicates(options):
+    """1,000 clients want 50 pictures of a stored mesh."""
+    _, servers = service(options, options.nodes)
+    digest = hashlib.sha256(CUBE).hexdigest()
+    assert servers[0].ask("POST", "/v1/meshes", CUBE)[0] == 201
+
+    def send(number):
+        size = 64 + number % 50
+        document = json.dumps({"mesh": digest, "style": "wire", "image": {"width": size, "height": size, "format": "png"}})
+        answer = random.choice(servers).ask("POST", "/v1/jobs", document, {"Content-Type": "application/json"})
+        return answer[1]["location"] if answer[0] == 202 else sys.exit(f"refused: {answer}")
+
+    count = min(options.jobs, 1000)
+    with concurrent.futures.ThreadPoolExecutor(100) as pool:
+        jobs = list(pool.map(send, range(count)))
+    until = time.time() + 120
+    with concurrent.futures.ThreadPoolExecutor(16) as pool:
+        states = list(pool.map(lambda job: end_of(servers, job, until), jobs))
+    done = sum(bool(state) and state["state"] == "done" for state in states)
+    drawn = sum(server.metric("meshsnap_stage_seconds_count", 'stage="render"') for server in servers)
+    print(f"{count} jobs of 50 kinds: {done} done, {drawn:.0f} drawn (at most 55)")
+    return done == count and drawn <= 55
+
+
+def slow_store(options):
+    """A bucket behind a proxy that waits 2 s before one answer in ten and breaks one connection in twenty."""
+    from moto.server import ThreadedMotoServer
+    import boto3
+
+    moto = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+    moto.start()
+    host, port = moto.get_host_and_port()
+    boto3.client("s3", endpoint_url=f"http://{host}:{port}", region_name="us-east-1", aws_access_key_id="key",
+                 aws_secret_access_key="secret").create_bucket(Bucket="farm")
+    trouble = {"on": False}
+
+    def pass_on(client):
+        with client:
+            if trouble["on"] and random.random() < 0.05:
+                return
+            if trouble["on"]:
+                time.sleep(2 * random.random())
+            with socket.create_connection((host, port)) as server:
+                def copy(source, target):
+                    try:
+                        while chunk := source.recv(1 << 16):
+                            target.sendall(chunk)
+                        target.shutdown(socket.SHUT_WR)
+                    except OSError:
+                        pass
+                back = threading.Thread(target=copy, args=(server, client), daemon=True)
+                back.start()
+                copy(client, server)
+                back.join()
+
+    listener = socket.create_server(("127.0.0.1", 0))
+
+    def accept():
+        while True:
+            client, _ = listener.accept()
+            threading.Thread(target=pass_on, args=(client,), daemon=True).start()
+
+    threading.Thread(target=accept, daemon=True).start()
+    options.store = "s3://farm/jobs"
+    environment = {"AWS_ENDPOINT_URL": f"http://127.0.0.1:{listener.getsockname()[1]}", "AWS_ACCESS_KEY_ID": "key",
+                   "AWS_SECRET_ACCESS_KEY": "secret", "AWS_REGION": "us-east-1"}
+    _, servers = service(options, 2, ["--workers", "2"], environment)
+    count, rates, jobs = min(options.jobs, 200), [], {}  # a multiple of the kinds of requests
+    for is_slow in (False, True, False):
+        trouble["on"] = is_slow
+        began = time.time()
+        part = {len(jobs) + number: job for number, job in many(servers, count).items()}
+        ends = [end_of(servers, job, time.time() + 300) for job in part.values()]
+        rates.append(count / (time.time() - began))
+        print(f"{'slow' if is_slow else 'as it is'}: {rates[-1]:.1f} jobs a second, "
+              f"{sum(bool(end) and end['state'] == 'done' for end in ends)} of {count} done")
+        jobs.update(part)
+    return check(options, servers, jobs, 60) and rates[2] > rates[0] / 2
+
+
+def scaling(options):
+    """Servers with half a core each; and what the queue costs each job."""
+    path = "style=wire&size=700&samples=16"
+    rates = {}
+    for count in (1, 2, 4):
+        options.folder = os.path.join(options.root, f"scale-{count}")
+        os.makedirs(options.folder)
+        nats, servers = service(options, count, ["--workers", "1", "--worker-threads", "1"])
+        for server in servers:
+            limit(server.process.pid, options.share)
+        jobs = many(servers, 40 * count, path)
+        began, until = time.time(), time.time() + 300
+        if any(not (end := end_of(servers, job, until)) or end["state"] != "done" for job in jobs.values()):
+            return False
+        ends = [json.loads(servers[0].ask("GET", job)[2]) for job in list(jobs.values())[:4]]
+        rates[count] = 40 * count / (time.time() - began)
+        print(f"{count} servers: {rates[count]:.2f} pictures a second, efficiency {rates[count] / rates[1] / count:.2f}",
+              f"(a picture takes {ends[-1]['result']['timings_ms']['render']:.0f} ms)")
+        for server in servers:
+            server.kill()
+        nats.kill()
+    options.folder = os.path.join(options.root, "overhead")
+    os.makedirs(options.folder)
+    nats, servers = service(options, 1)
+    data = os.path.join(options.folder, "data")
+    alone = Server(options, ["--data-dir", data])
+    times = {"shared queue": [], "data folder": []}
+    for number in range(200):
+        for name, server in (("shared queue", servers[0]), ("data folder", alone)):
+            began = time.time()
+            job = submit([server], number, path="style=flat&size=32")
+            end_of([server], job, time.time() + 60)
+            times[name].append((time.time() - began) * 1e3)
+    for name, values in times.items():
+        cuts = statistics.quantiles(values, n=100)
+        print(f"{name}: from POST to the end p50 {cuts[49]:.1f} ms, p99 {cuts[98]:.1f} ms")
+    return rates[4] / rates[1] / 4 >= 0.85
+
+
+def limit(pid, cores):
+    """Holds a process at part of a core by a group of its own (cgroup 2, or 1)."""
+    for root, name, value in (("/sys/fs/cgroup", "cpu.max", f"{int(cores * 1e5)} 100000"),
+                              ("/sys/fs/cgroup/cpu", "cpu.cfs_quota_us", str(int(cores * 1e5)))):
+        if not os.path.exists(os.path.join(root, "cgroup.procs")):
+            continue
+        group = os.path.join(root, f"meshsnap-bench-{pid}")
+        try:
+            os.makedirs(group, exist_ok=True)
+            with open(os.path.join(group, name), "w", encoding="ascii") as file:
+                file.write(value)
+            with open(os.path.join(group, "cgroup.procs"), "w", encoding="ascii") as file:
+                file.write(str(pid))
+            return
+        except OSError as error:
+            print(error)
+    sys.exit("no control group can be made here: run it as root")
+
+
+def partition(options):
+    """Servers in network namespaces whose links are cut at random for 5 to 40 s."""
+    def ip(*arguments):
+        subprocess.run(["ip", *arguments], check=True)
+
+    names = [f"ms{os.getpid() % 10000}n{number}" for number in range(options.nodes)]
+    ip("link", "add", "msbridge", "type", "bridge")
+    ip("addr", "add", "10.77.0.1/24", "dev", "msbridge")
+    ip("link", "set", "msbridge", "up")
+    try:
+        nats = Nats(options.nats, options.folder, "10.77.0.1")
+        store = os.path.join(options.folder, "store")
+        os.makedirs(store)
+        servers = []
+        for number, name in enumerate(names):
+            ip("netns", "add", name)
+            ip("link", "add", f"{name}a", "type", "veth", "peer", "name", f"{name}b", "netns", name)
+            ip("link", "set", f"{name}a", "master", "msbridge", "up")
+            address = f"10.77.0.{number + 10}"
+            ip("-n", name, "addr", "add", f"{address}/24", "dev", f"{name}b")
+            ip("-n", name, "link", "set", f"{name}b", "up")
+            ip("-n", name, "link", "set", "lo", "up")
+            arguments = ["--queue", nats.address(), "--store", f"file://{store}", "--workers", "2", "--no-auth"]
+            servers.append(Server(options, arguments, prefix=["ip", "netns", "exec", name], listen=f"{address}:8080"))
+        over, cuts = threading.Event(), []
+
+        def disturb(number):
+            while not over.wait(random.uniform(2, 10)):
+                time_s = random.uniform(5, 40)
+                cuts.append(time_s)
+                ip("link", "set", f"{names[number]}a", "down")
+                over.wait(time_s)
+                ip("link", "set", f"{names[number]}a", "up")
+
+        disturbing = [threading.Thread(target=disturb, args=(number,)) for number in range(options.nodes)]
+        for thread in disturbing:
+            thread.start()
+        jobs, began = {}, time.time()
+
+        def send(first):
+            for number in range(first, options.jobs, 8):
+                if time.time() - began > options.seconds:
+                    return
+                jobs[number] = submit_with_patience(servers, number)
+                time.sleep(options.seconds * 8 / options.jobs * random.random())
+
+        with concurrent.futures.ThreadPoolExecutor(8) as pool:
+            list(pool.map(send, range(8)))
+        over.set()
+        for thread in disturbing:
+            thread.join()
+        print(f"{len(cuts)} cuts of {min(cuts):.0f} to {max(cuts):.0f} s")
+        return check(options, servers, dict(sorted(jobs.items())), 180)
+    finally:
+        for name in names:
+            subprocess.run(["ip", "netns", "del", name], check=False)
+        subprocess.run(["ip", "link", "del", "msbridge"], check=False)
+
+
+def submit_with_patience(servers, number):
+    """A server that is cut off does not answer: the next one is asked under the same name."""
+    key = f"job-{number}-{os.getpid()}"
+    while True:
+        answer = random.choice(servers).ask("POST", f"/v1/jobs?{query(number)}", CUBE, {"Idempotency-Key": key}, timeout=3)
+        if answer and answer[0] == 202:
+            return answer[1]["location"]
+
+
+RUNS = {"kills": kills, "partition": partition, "slow-store": slow_store, "duplicates": duplicates, "scaling": scaling}
 
 
 def main():
@@ -249,10 +464,11 @@ def main():
     parser.add_argument("--seconds", type=int, default=60)
     parser.add_argument("--nodes", type=int, default=4)
     parser.add_argument("--nats", default=shutil.which("nats-server") or "/usr/sbin/nats-server")
+    parser.add_argument("--share", type=float, default=0.5, help="of a core, for each server of `scaling`")
     parser.add_argument("--keep")
     options = parser.parse_args()
     options.binary, options.store = os.path.abspath(options.binary), None
-    options.folder = options.keep or tempfile.mkdtemp()
+    options.folder = options.root = options.keep or tempfile.mkdtemp()
     os.makedirs(options.folder, exist_ok=True)
     children = os.getpgrp()
     try:
@@ -264,7 +480,7 @@ def main():
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         os.killpg(children, signal.SIGTERM)
         if not options.keep:
-            shutil.rmtree(options.folder, ignore_errors=True)
+            shutil.rmtree(options.root, ignore_errors=True)
 
 
 if __name__ == "__main__":

@@ -181,11 +181,13 @@ impl SharedQueue {
         Ok(live)
     }
 
-    /// The note on a job.
-    pub async fn note(&self, key: JobKey) -> Result<Option<Note>, QueueError> {
+    /// The note on a job, and its age.
+    pub async fn note(&self, key: JobKey) -> Result<Option<(Note, Duration)>, QueueError> {
         self.check_connection()?;
-        let found = self.notes().await.get(name_of(key)).await.map_err(|error| self.unavailable(&error))?;
-        Ok(found.and_then(|bytes| serde_json::from_slice(&bytes).ok()))
+        let found = self.notes().await.entry(name_of(key)).await.map_err(|error| self.unavailable(&error))?;
+        let Some(entry) = found.filter(|entry| entry.operation == Operation::Put) else { return Ok(None) };
+        let age = Duration::from_secs(seconds_since(entry.created.unix_timestamp()));
+        Ok(serde_json::from_slice(&entry.value).ok().map(|note| (note, age)))
     }
 
     /// Replaces the note on a job, and tells those who follow it.
@@ -198,9 +200,13 @@ impl SharedQueue {
     /// Follows the notes on a job from now on. Notes may be missed while NATS cannot be reached.
     pub async fn follow(&self, key: JobKey) -> Result<Following, QueueError> {
         // A bucket is a stream of the subjects of its keys, and who listens to a subject hears of it at once.
+        self.check_connection()?;
         let subject = format!("{}{}", self.notes().await.prefix, name_of(key));
-        let notes = self.client.subscribe(subject).await.map_err(|error| self.error(error.to_string()))?;
-        Ok(Following { notes })
+        match tokio::time::timeout(ANSWER_TIME, self.client.subscribe(subject)).await {
+            Ok(Ok(notes)) => Ok(Following { notes }),
+            Ok(Err(error)) => Err(self.error(error.to_string())),
+            Err(_) => Err(self.error("no answer".to_owned())),
+        }
     }
 
     /// Takes a lease, or makes it last longer. False if another holder has it. The clocks of the machines decide when it
@@ -230,7 +236,10 @@ impl SharedQueue {
 
     /// Gives a lease back. It ends by itself where that fails.
     pub async fn release(&self, name: &str) {
-        let _ = self.notes().await.delete(format!("lease.{name}")).await;
+        let notes = self.notes().await;
+        if self.is_connected() {
+            let _ = tokio::time::timeout(ANSWER_TIME, notes.delete(format!("lease.{name}"))).await;
+        }
     }
 
     /// The load of the queue.
@@ -240,14 +249,15 @@ impl SharedQueue {
         let of_jobs = jobs.stream.get_info().await.map_err(|error| self.unavailable(&error))?;
         let of_webhooks = webhooks.stream.get_info().await.map_err(|error| self.unavailable(&error))?;
         let consumer = jobs.consumer.get_info().await.map_err(|error| self.unavailable(&error))?;
-        let first_unix_s = of_jobs.state.first_timestamp.unix_timestamp();
-        let now_unix_s = i64::try_from(unix_ms() / 1000).unwrap_or(i64::MAX);
-        let oldest = if of_jobs.state.messages == 0 { 0 } else { now_unix_s.saturating_sub(first_unix_s).max(0) };
+        let oldest = match of_jobs.state.messages {
+            0 => 0,
+            _ => seconds_since(of_jobs.state.first_timestamp.unix_timestamp()),
+        };
         Ok(QueueLoad {
             jobs: of_jobs.state.messages,
             webhooks: of_webhooks.state.messages,
             redelivered: consumer.num_redelivered as u64,
-            oldest: Duration::from_secs(oldest.unsigned_abs()),
+            oldest: Duration::from_secs(oldest),
         })
     }
 
@@ -317,12 +327,12 @@ impl Delivery {
 
     /// Keeps the message for longer.
     pub async fn sign_of_life(&self) {
-        let _ = self.message.ack_with(AckKind::Progress).await;
+        let _ = tokio::time::timeout(ANSWER_TIME, self.message.ack_with(AckKind::Progress)).await;
     }
 
     /// Lets another daemon have it, after a while.
     pub async fn give_back(&self, after: Duration) {
-        let _ = self.message.ack_with(AckKind::Nak(Some(after))).await;
+        let _ = tokio::time::timeout(ANSWER_TIME, self.message.ack_with(AckKind::Nak(Some(after)))).await;
     }
 
     /// Ends the message. Returns once JetStream has said that it has. If it does not, the message comes again.
@@ -481,6 +491,11 @@ fn words_of(error: &(dyn std::error::Error + 'static)) -> String {
 
 fn to_words<E: std::error::Error + 'static>(error: E) -> String {
     words_of(&error)
+}
+
+fn seconds_since(unix_s: i64) -> u64 {
+    let now_unix_s = i64::try_from(unix_ms() / 1000).unwrap_or(i64::MAX);
+    now_unix_s.saturating_sub(unix_s).max(0).unsigned_abs()
 }
 
 fn unix_ms() -> u64 {

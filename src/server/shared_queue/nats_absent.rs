@@ -42,7 +42,7 @@ impl SharedQueue {
     }
 
     /// Unreachable.
-    pub async fn note(&self, _: JobKey) -> Result<Option<Note>, QueueError> {
+    pub async fn note(&self, _: JobKey) -> Result<Option<(Note, Duration)>, QueueError> {
         match self.0 {}
     }
 

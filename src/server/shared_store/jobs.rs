@@ -42,7 +42,7 @@ struct BlobHead {
 }
 
 /// A job that has ended: the first line of its object. The bytes of its result follow.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct EndedJob {
     /// The party that asked for it.
     pub owner: String,
@@ -82,14 +82,14 @@ const WEBHOOKS: &str = "webhooks";
 const HEAD_BYTES: [u64; 2] = [16 << 10, 4 << 20];
 
 impl EndedJob {
-    /// The end of a job.
-    pub fn of(record: &JobRecord, end: EndRecord) -> Self {
+    /// A job whose end is not known yet.
+    pub fn of(record: &JobRecord) -> Self {
         Self {
             owner: record.owner.clone(),
             accepted_unix_ms: record.accepted_unix_ms,
             claim: record.claim.clone(),
             webhook: record.webhook.clone(),
-            end,
+            end: EndRecord::default(),
         }
     }
 }
@@ -166,9 +166,23 @@ impl SharedStore {
         self.create(&place(RESULTS, key), [line_of(ended), content].into_iter().collect()).await
     }
 
-    /// The end of a job, and the bytes of its result. None if it has not ended, or was forgotten.
-    pub async fn end(&self, key: JobKey) -> Result<Option<(EndedJob, Bytes)>, Unavailable> {
-        Ok(self.read(&place(RESULTS, key)).await?.and_then(split::<EndedJob>))
+    /// The end of a job, and the bytes of its result, if `admit` says that they may be read. None if the job has not ended,
+    /// was forgotten, or may not be read.
+    pub async fn end(
+        &self,
+        key: JobKey,
+        admit: &mut (dyn FnMut(u64) -> bool + Send),
+    ) -> Result<Option<(EndedJob, Bytes)>, Unavailable> {
+        let found = match self.objects.get(&place(RESULTS, key)).await {
+            Ok(found) => found,
+            Err(object_store::Error::NotFound { .. }) => return Ok(None),
+            Err(cause) => return Err(self.unavailable(cause)),
+        };
+        if !admit(found.meta.size) {
+            return Ok(None);
+        }
+        let bytes = found.bytes().await.map_err(|cause| self.unavailable(cause))?;
+        Ok(split::<EndedJob>(bytes))
     }
 
     /// Forgets a job that has ended.
@@ -180,6 +194,15 @@ impl SharedStore {
     pub async fn owe_webhook(&self, key: JobKey) -> Result<(), Unavailable> {
         let noted = self.objects.put(&place(WEBHOOKS, key), PutPayload::new()).await;
         noted.map(drop).map_err(|cause| self.unavailable(cause))
+    }
+
+    /// True if the webhook of a job is to be told of its end.
+    pub async fn owes_webhook(&self, key: JobKey) -> Result<bool, Unavailable> {
+        match self.objects.head(&place(WEBHOOKS, key)).await {
+            Ok(_) => Ok(true),
+            Err(object_store::Error::NotFound { .. }) => Ok(false),
+            Err(cause) => Err(self.unavailable(cause)),
+        }
     }
 
     /// The webhook of a job was told of its end.

@@ -14,7 +14,7 @@ use crate::http::error::ApiError;
 use crate::http::receive::idempotency::{self, Sent};
 use crate::http::state::AppState;
 use crate::jobs::{ClaimName, Job, JobId, JobState, Progress, Refusal, Restored, Work, record_of, unix_ms};
-use crate::shared_queue::{Kind, Note};
+use crate::shared_queue::{Kind, Note, QueueError};
 use crate::shared_store::AcceptedJob;
 
 /// Objects that are written at a time.
@@ -25,7 +25,8 @@ pub async fn accept(state: &AppState, work: Work) -> Result<Arc<Job>, ApiError> 
     accept_all(state, vec![work]).await?.pop().ok_or_else(ApiError::internal)
 }
 
-/// Accepts several jobs of one owner: all of them or none.
+/// Accepts several jobs of one owner: all of them or, with an error, none. Where a write to a shared store ends with an
+/// error, some may be done all the same.
 pub async fn accept_all(state: &AppState, works: Vec<Work>) -> Result<Vec<Arc<Job>>, ApiError> {
     let Some(shared) = &state.shared_jobs else { return Ok(state.jobs.accept_all(works).await?) };
     if state.is_draining() {
@@ -46,10 +47,18 @@ pub async fn accept_all(state: &AppState, works: Vec<Work>) -> Result<Vec<Arc<Jo
 pub async fn sent_before(state: &AppState, name: &ClaimName, request: Digest) -> Result<Option<Sent>, ApiError> {
     let Some(shared) = &state.shared_jobs else { return Ok(None) };
     let Some((job, claim)) = shared.look_up_stored(&state.memory, id_of(name)).await? else { return Ok(None) };
-    match claim.is_some_and(|claim| claim.request == request) {
-        true => Ok(Some(Sent::Again(Arc::new(job)))),
-        false => Err(idempotency::reused()),
+    if claim.is_none_or(|claim| claim.request != request) {
+        return Err(idempotency::reused());
     }
+    if !job.state().is_final() {
+        // The server that stored it may not have sent its message yet, and may find the queue full. The same message
+        // twice is one.
+        let sent = shared.queue.send(Kind::Job, job.id.key(), &message_name(job.id.key(), job.accepted_unix_ms)).await;
+        if matches!(sent, Err(QueueError::Full)) {
+            return Err(QueueError::Full.into());
+        }
+    }
+    Ok(Some(Sent::Again(Arc::new(job))))
 }
 
 /// The id of a job whose request has a name: two servers that get it at the same time give its job the same id.
@@ -110,16 +119,23 @@ impl SharedJobs {
         }
         let messages = stream::iter(jobs.to_vec()).map(|job| {
             let shared = self.clone();
-            async move { shared.announce(&job).await }
+            async move { shared.announce(&job.record).await }
         });
-        messages.buffered(WRITES).try_collect::<()>().await.map_err(|error| (error, ours))
+        messages.buffered(WRITES).try_collect::<()>().await.map_err(|full| (full.into(), ours))
     }
 
-    async fn announce(&self, job: &AcceptedJob) -> Result<(), ApiError> {
-        let (key, record) = (job.record.key, &job.record);
-        let accepted_unix_ms = record.accepted_unix_ms;
-        self.queue.set_note(key, &note_of(record)).await?;
-        Ok(self.queue.send(Kind::Job, key, &message_name(key, accepted_unix_ms)).await?)
+    /// Sends the message of a job that is stored. The only error is a full queue. A job whose message is lost in any other way is
+    /// kept all the same: the sweep sends it.
+    async fn announce(&self, record: &JobRecord) -> Result<(), QueueError> {
+        let _ = self.queue.set_note(record.key, &note_of(record)).await;
+        match self.queue.send(Kind::Job, record.key, &message_name(record.key, record.accepted_unix_ms)).await {
+            Err(QueueError::Full) => Err(QueueError::Full),
+            Err(error) => {
+                tracing::warn!(%error, job = %JobId::from_key(record.key), "a job will be sent to the queue later");
+                Ok(())
+            }
+            Ok(()) => Ok(()),
+        }
     }
 }
 

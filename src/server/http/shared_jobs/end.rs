@@ -6,42 +6,73 @@ use bytes::Bytes;
 
 use super::service::{SharedJobs, id_of};
 use crate::digest::Digest;
-use crate::durable::{JobKey, JobRecord};
+use crate::durable::JobKey;
 use crate::http::error::{self, ApiError};
 use crate::jobs::{JobState, end_of};
 use crate::shared_queue::{Kind, Note, QueueError};
 use crate::shared_store::{EndedJob, Unavailable};
 
 impl SharedJobs {
-    /// Ends a job in this state, unless it has ended in another.
-    pub(super) async fn end(&self, record: &JobRecord, state: &JobState) -> Result<(), Untold> {
-        let content = match state {
-            JobState::Done(finished) => finished.content.clone(),
-            _ => Bytes::new(),
-        };
-        let digest = matches!(state, JobState::Done(_)).then(|| Digest::of(&content));
-        let ended = EndedJob::of(record, end_of(state, digest, error::record));
-        if ended.webhook.is_some() {
-            self.store.owe_webhook(record.key).await?;
+    /// Ends a job in this state, unless it has ended in another, and tells everybody.
+    pub(super) async fn end(&self, key: JobKey, job: EndedJob, state: &JobState) -> Result<(), Untold> {
+        let (ended, content) = with_end(job, state);
+        let is_first = self.store_end(key, &ended, content, state.name()).await?;
+        self.tell(key, &ended, is_first).await
+    }
+
+    /// Stores the end of a job. False if it has another end.
+    pub(super) async fn store_end(
+        &self,
+        key: JobKey,
+        ended: &EndedJob,
+        content: Bytes,
+        name: &str,
+    ) -> Result<bool, Untold> {
+        if self.store.create_end(key, ended, content).await? {
+            tracing::info!(job = %id_of(key), end = name, "a job of the shared queue ended");
+            return Ok(true);
         }
-        if self.store.create_end(record.key, &ended, content).await? {
-            let (job, request_id, end) = (id_of(record.key), &*record.request_id, state.name());
-            tracing::info!(%job, request_id, end, "a job of the shared queue ended");
+        // A refusal alone does not mean that there is an end: S3 also refuses while another write or delete is on its way.
+        match self.store.end(key, &mut |_| true).await? {
+            // The answer to the write was lost, and it was tried again.
+            Some((found, _)) => Ok(found.end.at_unix_ms == ended.end.at_unix_ms),
+            None => Err(Untold::Conflict),
         }
-        self.tell(record.key, ended.webhook.is_some()).await
     }
 
     /// Tells everybody that a job has ended, and removes its object.
-    pub(super) async fn tell(&self, key: JobKey, has_webhook: bool) -> Result<(), Untold> {
-        if has_webhook {
-            self.queue.send(Kind::Webhook, key, &format!("{key:032x} webhook")).await?;
+    pub(super) async fn tell(&self, key: JobKey, ended: &EndedJob, tells_webhook: bool) -> Result<(), Untold> {
+        if ended.webhook.is_some() && tells_webhook {
+            self.store.owe_webhook(key).await?;
+            match self.queue.send(Kind::Webhook, key, &format!("{key:032x} webhook")).await {
+                // The sweep sends it when there is room.
+                Ok(()) | Err(QueueError::Full) => {}
+                Err(error) => return Err(error.into()),
+            }
         }
         self.queue.set_note(key, &Note { has_ended: true, ..Note::default() }).await?;
+        // Under the name of a request, there may be a new job by now.
+        if ended.claim.is_some()
+            && let Some(record) = self.store.job_record(key).await?
+            && record.accepted_unix_ms != ended.accepted_unix_ms
+        {
+            return Ok(());
+        }
         Ok(self.store.delete_job(key).await?)
     }
 }
 
-/// Reasons why the end of a job is not stored, or not everybody is told of it. To end the job again does the rest.
+/// A job with its end, and the bytes of its result.
+pub(super) fn with_end(job: EndedJob, state: &JobState) -> (EndedJob, Bytes) {
+    let content = match state {
+        JobState::Done(finished) => finished.content.clone(),
+        _ => Bytes::new(),
+    };
+    let digest = matches!(state, JobState::Done(_)).then(|| Digest::of(&content));
+    (EndedJob { end: end_of(state, digest, error::record), ..job }, content)
+}
+
+/// Reasons why the end of a job is not stored, or not everybody is told of it. Trying again does the rest.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Untold {
     /// The store cannot be reached.
@@ -50,6 +81,9 @@ pub(super) enum Untold {
     /// The queue cannot be reached.
     #[error(transparent)]
     Queue(#[from] QueueError),
+    /// Another server writes to the same object.
+    #[error("another server writes the end of the same job")]
+    Conflict,
 }
 
 impl From<Untold> for ApiError {
@@ -57,6 +91,7 @@ impl From<Untold> for ApiError {
         match error {
             Untold::Store(error) => error.into(),
             Untold::Queue(error) => error.into(),
+            Untold::Conflict => super::service::unavailable(),
         }
     }
 }

@@ -5,11 +5,12 @@ use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use super::service::SharedJobs;
+use crate::digest::Digest;
 use crate::durable::ClaimRecord;
 use crate::http::error::ApiError;
 use crate::http::state::AppState;
 use crate::jobs::{Job, JobId, JobState, Owner, Progress, Restored, Step, read_end};
-use crate::memory::Memory;
+use crate::memory::{Account, Memory};
 use crate::shared_queue::Note;
 use crate::shared_store::EndedJob;
 
@@ -37,11 +38,13 @@ pub async fn delete(state: &AppState, job: Arc<Job>) -> Result<Arc<Job>, ApiErro
     let Some(shared) = &state.shared_jobs else { return Ok(job) };
     let key = job.id.key();
     if job.state().is_final() {
+        // Without its object, a server that is about to end it once more does not.
+        shared.store.delete_job(key).await?;
         shared.store.delete_end(key).await?;
         return Ok(job);
     }
     if let Some(record) = shared.store.job_record(key).await? {
-        shared.end(&record, &JobState::Cancelled).await?;
+        shared.end(key, EndedJob::of(&record), &JobState::Cancelled).await?;
     }
     // It may have ended in another way at the same moment.
     Ok(shared.look_up(&state.memory, job.id).await?.map_or(job, Arc::new))
@@ -51,7 +54,13 @@ impl SharedJobs {
     /// A mirror of a job. None if there is no such job, or its end has expired.
     pub(super) async fn look_up(&self, memory: &Arc<Memory>, id: JobId) -> Result<Option<Job>, ApiError> {
         // Without the queue, the store knows enough.
-        if let Some(note) = self.queue.note(id.key()).await.ok().flatten().filter(|note| !note.has_ended) {
+        if let Some((note, age)) = self.queue.note(id.key()).await.ok().flatten().filter(|(note, _)| !note.has_ended) {
+            // The newest note may be lost with the queue's disk.
+            if age > NOTE_TRUST
+                && let Some((job, _)) = self.look_up_end(memory, id).await?
+            {
+                return Ok(Some(job));
+            }
             let (state, progress) = shown_by(&note);
             return Ok(Some(mirror(id, (&note.owner, note.accepted_unix_ms), state, progress)));
         }
@@ -82,15 +91,33 @@ impl SharedJobs {
         memory: &Arc<Memory>,
         id: JobId,
     ) -> Result<Option<(Job, Option<ClaimRecord>)>, ApiError> {
-        let Some((ended, content)) = self.store.end(id.key()).await? else { return Ok(None) };
+        let share = memory.share(Account::Results);
+        let mut full = None;
+        let mut admit = |bytes| match share.grow(bytes) {
+            Ok(()) => true,
+            Err(error) => {
+                full = Some(error);
+                false
+            }
+        };
+        let found = self.store.end(id.key(), &mut admit).await?;
+        if let Some(error) = full {
+            return Err(error.into());
+        }
+        let Some((ended, content)) = found else { return Ok(None) };
         let EndedJob { owner, accepted_unix_ms, claim, end, .. } = ended;
-        let state = read_end(&end, Some(content), memory);
+        // What the store has damaged is lost.
+        let content = Some(content)
+            .filter(|bytes| end.picture.as_ref().is_none_or(|picture| Digest::of(bytes) == picture.digest));
+        // From here on, the result counts its bytes.
+        drop(share);
+        let state = read_end(&end, content, memory);
         Ok(Some((mirror(id, (&owner, accepted_unix_ms), state, DRAWN), claim)))
     }
 
     async fn follow(self: Arc<Self>, memory: Arc<Memory>, job: Weak<Job>, id: JobId) {
         let mut notes = None;
-        loop {
+        while job.strong_count() > 0 {
             if notes.is_none() {
                 notes = self.queue.follow(id.key()).await.ok();
             }
@@ -134,6 +161,9 @@ fn mirror(id: JobId, (owner, accepted_unix_ms): (&str, u64), state: JobState, pr
     let owner = Owner::new(owner);
     Job::mirror_of(Restored { id, accepted_unix_ms, owner, claim: None }, state, progress)
 }
+
+/// The age from which a note that says that a job has not ended is compared with the store.
+const NOTE_TRUST: Duration = Duration::from_secs(30);
 
 /// The progress of a job that has ended, of which nobody asks for the steps any more.
 const DRAWN: Progress = Progress { step: Step::Encoding, drawn: 0, views: 0 };

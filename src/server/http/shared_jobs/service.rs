@@ -13,7 +13,7 @@ use crate::shared_queue::{QueueError, QueueLoad, SharedQueue};
 use crate::shared_store::SharedStore;
 
 /// Webhooks that this daemon tells at a time.
-const TELLING_MAX: usize = 64;
+const TELLING_MAX: usize = 1000;
 
 /// The queue and the store of a service, and what this daemon has of its jobs.
 pub struct SharedJobs {

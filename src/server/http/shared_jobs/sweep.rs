@@ -10,7 +10,6 @@ use super::service::SharedJobs;
 use crate::http::error::ApiError;
 use crate::jobs::unix_ms;
 use crate::shared_queue::Kind;
-use crate::shared_store::Ages;
 
 /// Time between two looks.
 const LOOK_EVERY: Duration = Duration::from_secs(10);
@@ -43,25 +42,26 @@ pub async fn run(shared: Arc<SharedJobs>) {
                 continue;
             }
         }
-        let forgets = forgot.elapsed() >= FORGET_EVERY;
-        if forgets {
+        warn(shared.send_again(Kind::Job).await);
+        warn(shared.send_again(Kind::Webhook).await);
+        if forgot.elapsed() >= FORGET_EVERY {
             forgot = Instant::now();
-        }
-        if let Err(error) = shared.look(forgets).await {
-            tracing::warn!(error = error.detail, "the queue was not looked after");
+            warn(shared.forget_old_ends().await);
         }
     }
 }
 
+fn warn(looked: Result<(), ApiError>) {
+    if let Err(error) = looked {
+        tracing::warn!(error = error.detail, "the queue was not looked after");
+    }
+}
+
 impl SharedJobs {
-    async fn look(&self, forgets: bool) -> Result<(), ApiError> {
-        self.send_again(Kind::Job, self.store.jobs().await?).await?;
-        self.send_again(Kind::Webhook, self.store.owed_webhooks().await?).await?;
-        if forgets {
-            for (key, age) in self.store.ends().await? {
-                if age > self.end_time {
-                    self.store.delete_end(key).await?;
-                }
+    async fn forget_old_ends(&self) -> Result<(), ApiError> {
+        for (key, age) in self.store.ends().await? {
+            if age > self.end_time {
+                self.store.delete_end(key).await?;
             }
         }
         Ok(())
@@ -69,7 +69,11 @@ impl SharedJobs {
 
     /// Sends messages about objects that have none. The objects were listed before the messages are, so that none is
     /// missing because it was written in between.
-    async fn send_again(&self, kind: Kind, objects: Ages) -> Result<(), ApiError> {
+    async fn send_again(&self, kind: Kind) -> Result<(), ApiError> {
+        let objects = match kind {
+            Kind::Job => self.store.jobs().await?,
+            Kind::Webhook => self.store.owed_webhooks().await?,
+        };
         if objects.is_empty() {
             return Ok(());
         }

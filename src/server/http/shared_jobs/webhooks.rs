@@ -2,6 +2,7 @@
 //! time has it, and makes all attempts; if it stops, another begins again.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use tokio::sync::{OwnedSemaphorePermit, oneshot};
 
@@ -13,7 +14,10 @@ use crate::jobs::{Job, Owner, Progress, Restored, read_end};
 use crate::shared_queue::{Delivery, Kind, SIGN_EVERY};
 
 /// Pause after a failure of the queue or the store.
-const PAUSE: std::time::Duration = std::time::Duration::from_secs(1);
+const PAUSE: Duration = Duration::from_secs(1);
+
+/// Time between two looks at whether the server drains.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
 
 /// Tells webhooks until the server drains.
 pub async fn run(shared: Arc<SharedJobs>, state: Arc<AppState>) {
@@ -42,8 +46,19 @@ impl SharedJobs {
         let Some(key) = delivery.key() else { return delivery.end().await };
         let Ok(told) = self.begin_to_tell(&state, key).await else { return delivery.give_back(PAUSE).await };
         if let Some(mut told) = told {
-            while tokio::time::timeout(SIGN_EVERY, &mut told).await.is_err() {
-                delivery.sign_of_life().await;
+            let mut signed = Instant::now();
+            loop {
+                match tokio::time::timeout(LOOK_EVERY, &mut told).await {
+                    Ok(Ok(())) => break,
+                    // Another delivery of the same message took its place.
+                    Ok(Err(_)) => return,
+                    Err(_) if state.is_draining() => return delivery.give_back(Duration::ZERO).await,
+                    Err(_) => {}
+                }
+                if signed.elapsed() >= SIGN_EVERY {
+                    signed = Instant::now();
+                    delivery.sign_of_life().await;
+                }
             }
         }
         match self.store.settle_webhook(key).await {
@@ -54,7 +69,11 @@ impl SharedJobs {
 
     /// Sends the message about a job. None if nobody is to be told any more.
     async fn begin_to_tell(&self, state: &AppState, key: JobKey) -> Result<Option<oneshot::Receiver<()>>, ()> {
-        let Some((ended, content)) = self.store.end(key).await.map_err(drop)? else { return Ok(None) };
+        if !self.store.owes_webhook(key).await.map_err(drop)? {
+            return Ok(None);
+        }
+        let found = self.store.end(key, &mut |_| true).await.map_err(drop)?;
+        let Some((ended, content)) = found else { return Ok(None) };
         let Some(address) = ended.webhook else { return Ok(None) };
         let (id, owner) = (id_of(key), Owner::new(&ended.owner));
         let name = Restored { id, accepted_unix_ms: ended.accepted_unix_ms, owner, claim: None };

@@ -1,13 +1,17 @@
 //! Takes jobs from the shared queue and lets this daemon's workers do them. The message of a job is acknowledged once the
 //! job's end is stored. A daemon that stops before that, however it stops, leaves the message to another.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use bytes::Bytes;
 use tokio::sync::OwnedSemaphorePermit;
 
 use super::accept::note_of;
+use super::end::with_end;
 use super::service::{SharedJobs, id_of};
+use crate::digest::Digest;
 use crate::durable::{FileRecord, JobKey, JobRecord};
 use crate::http::address::render_key;
 use crate::http::error::{ApiError, record_of};
@@ -17,8 +21,8 @@ use crate::http::stored_mesh;
 use crate::jobs::{Failure, Job, JobState, Owner, Task, Work};
 use crate::keys::Access;
 use crate::memory::Account;
-use crate::shared_queue::{Delivery, Kind, Note, SIGN_EVERY};
-use crate::shared_store::{AcceptedJob, FoundJob};
+use crate::shared_queue::{ACK_WAIT, Delivery, Kind, Note, SIGN_EVERY};
+use crate::shared_store::{AcceptedJob, EndedJob, FoundJob, Unavailable};
 use meshsnap_render::import::BundleFile;
 
 /// How often a job may be begun by daemons that then stopped.
@@ -35,6 +39,9 @@ const LEASE: Duration = Duration::from_secs(20);
 
 /// Time between two looks at how far a job has come.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
+
+/// The bytes that a record names.
+type Blobs = BTreeMap<Digest, Bytes>;
 
 /// The reason why a job is not done now, by this daemon: it is given back to the queue for a while.
 struct Later(Duration);
@@ -89,35 +96,51 @@ impl SharedJobs {
         if state.is_draining() {
             return Err(Later(Duration::ZERO));
         }
-        let note = self.queue.note(key).await.map_err(|_| Later(PAUSE))?;
+        let note = self.queue.note(key).await.map_err(|_| Later(PAUSE))?.map(|(note, _)| note);
         let is_new = note.as_ref().is_some_and(|note| note.starts == 0 && !note.has_ended);
-        if !is_new && let Some((ended, _)) = self.store.end(key).await.map_err(later)? {
-            return self.tell(key, ended.webhook.is_some()).await.map_err(later);
+        if !is_new && let Some((ended, _)) = self.store.end(key, &mut |_| true).await.map_err(later)? {
+            return self.tell(key, &ended, true).await.map_err(later);
         }
         let memory = state.memory.share(Account::Uploads);
         let mut admit = |bytes| memory.grow(bytes).is_ok();
-        let job = match self.store.job(key, &mut admit).await.map_err(later)? {
+        let AcceptedJob { record, blobs } = match self.store.job(key, &mut admit).await.map_err(later)? {
             FoundJob::Job(job) => *job,
             FoundJob::NoRoom => return Err(Later(PAUSE)),
             // It was taken back, cancelled, or has ended and was forgotten.
-            FoundJob::None => return self.tell(key, false).await.map_err(later),
+            FoundJob::None => return Ok(()),
             FoundJob::Damaged => {
-                let Ok(Some(record)) = self.store.job_record(key).await else { return Err(Later(PAUSE)) };
-                return self.end_surely(state, &record, failed(Failure::Lost)).await;
+                let Note { owner, accepted_unix_ms, .. } = note.unwrap_or_default();
+                let record = self.store.job_record(key).await.ok().flatten();
+                let unknown = EndedJob { owner, accepted_unix_ms, ..EndedJob::default() };
+                let job = record.map_or(unknown, |record| EndedJob::of(&record));
+                return self.end_surely(state, key, job, &failed(Failure::Lost)).await;
             }
         };
+        let note = Note { starts: note.map_or(0, |note| note.starts), ..note_of(&record) };
+        let ready = self.ready(state, (&record, &blobs), &note).await?;
         // From here on, the work counts its bytes.
-        drop(memory);
-        let note = Note { starts: note.map_or(0, |note| note.starts), ..note_of(&job.record) };
-        let ended = match self.ready(state, &job, &note).await? {
-            Ready::Ended(ended) => ended,
-            Ready::Work(work) => self.work(state, &job.record, *work, note).await?,
+        drop((memory, blobs));
+        let began = Instant::now();
+        let ended = match ready {
+            Ready::Ended(ended) => Some(ended),
+            Ready::Work(work) => self.work(state, &record, *work, note).await?,
         };
-        self.end_surely(state, &job.record, ended).await
+        let Some(ended) = ended else { return Ok(()) };
+        // After so long, another daemon may have ended it, and it may be forgotten.
+        if began.elapsed() > ACK_WAIT && !self.is_still(&record).await.map_err(later)? {
+            return Ok(());
+        }
+        self.end_surely(state, key, EndedJob::of(&record), &ended).await
+    }
+
+    /// True if the store has this job, and not another one under the same name.
+    async fn is_still(&self, record: &JobRecord) -> Result<bool, Unavailable> {
+        let found = self.store.job_record(record.key).await?;
+        Ok(found.is_some_and(|found| found.accepted_unix_ms == record.accepted_unix_ms))
     }
 
     /// The work of a job; its end, if that is known without one.
-    async fn ready(&self, state: &AppState, job: &AcceptedJob, note: &Note) -> Result<Ready, Later> {
+    async fn ready(&self, state: &AppState, job: (&JobRecord, &Blobs), note: &Note) -> Result<Ready, Later> {
         if note.starts >= STARTS_MAX {
             return Ok(Ready::Ended(failed(Failure::Crashed { times: note.starts })));
         }
@@ -132,9 +155,15 @@ impl SharedJobs {
         }
     }
 
-    /// The end of a job that a worker does. A picture of a stored mesh that was drawn already, by whichever daemon, is
-    /// not drawn again.
-    async fn work(&self, state: &Arc<AppState>, record: &JobRecord, work: Work, note: Note) -> Result<JobState, Later> {
+    /// The end of a job that a worker does; None if it has another end by then. A picture of a stored mesh that was drawn
+    /// already, by whichever daemon, is not drawn again.
+    async fn work(
+        &self,
+        state: &Arc<AppState>,
+        record: &JobRecord,
+        work: Work,
+        note: Note,
+    ) -> Result<Option<JobState>, Later> {
         let picture = match (&work.task, record.mesh) {
             (Task::Draw(spec), Some(mesh)) => {
                 let reading = recovery::reading(record.format_in.as_deref(), record.entry.clone());
@@ -144,19 +173,19 @@ impl SharedJobs {
         };
         let Some((mesh, key)) = picture else { return self.draw(state, record, work, note, None).await };
         if let Some(drawn) = self.drawn(state, (mesh, &key)).await {
-            return Ok(drawn);
+            return Ok(Some(drawn));
         }
-        let lease = crate::digest::Digest::of(key.as_bytes()).to_string();
+        let lease = Digest::of(key.as_bytes()).to_string();
         let holder = format!("{} {:032x}", self.server, record.key);
         if !self.queue.lease(&lease, &holder, LEASE).await.map_err(|_| Later(PAUSE))? {
             return Err(Later(SAME_PICTURE));
         }
         // It may have been drawn since the first look.
         let ended = match self.drawn(state, (mesh, &key)).await {
-            Some(drawn) => Ok(drawn),
+            Some(drawn) => Ok(Some(drawn)),
             None => self.draw(state, record, work, note, Some((&lease, &holder))).await,
         };
-        if let Ok(JobState::Done(finished)) = &ended
+        if let Ok(Some(JobState::Done(finished))) = &ended
             && !finished.is_substitute
             && let Err(error) = self.store.put_picture(mesh, &key, finished).await
         {
@@ -166,7 +195,7 @@ impl SharedJobs {
         ended
     }
 
-    async fn drawn(&self, state: &AppState, (mesh, key): (crate::digest::Digest, &str)) -> Option<JobState> {
+    async fn drawn(&self, state: &AppState, (mesh, key): (Digest, &str)) -> Option<JobState> {
         let picture = self.store.picture(mesh, key).await.ok().flatten()?;
         state.metrics.picture("shared");
         Some(JobState::Done(Arc::new(picture.counted(&state.memory))))
@@ -180,20 +209,24 @@ impl SharedJobs {
         work: Work,
         mut note: Note,
         lease: Option<(&str, &str)>,
-    ) -> Result<JobState, Later> {
+    ) -> Result<Option<JobState>, Later> {
         let key = record.key;
         // Its webhook is told by the service.
         let work = Work { webhook: None, ..work };
         let job = Waiting { job: state.jobs.do_shared((id_of(key), record.accepted_unix_ms), work), state };
-        let mut cancelled = self.queue.follow(key).await.map_err(|_| Later(PAUSE))?;
+        let mut notes = self.queue.follow(key).await.map_err(|_| Later(PAUSE))?;
         let mut looks: u32 = 0;
         loop {
-            let ended = tokio::select! {
-                ended = tokio::time::timeout(LOOK_EVERY, job.job.ended()) => ended.ok(),
-                Some(note) = cancelled.next() => note.has_ended.then_some(JobState::Cancelled),
+            let (ended, told) = tokio::select! {
+                ended = tokio::time::timeout(LOOK_EVERY, job.job.ended()) => (ended.ok(), false),
+                Some(note) = notes.next() => (None, note.has_ended),
             };
-            if let Some(ended) = ended {
+            if ended.is_some() {
                 return Ok(ended);
+            }
+            // Notes are no truth.
+            if told && !self.is_still(record).await.unwrap_or(true) {
+                return Ok(None);
             }
             let shown = note_on(&job.job, &note);
             if !shown.is_running && state.is_draining() {
@@ -211,15 +244,26 @@ impl SharedJobs {
     }
 
     /// Ends a job, however long the store or the queue cannot be reached.
-    async fn end_surely(&self, state: &AppState, record: &JobRecord, ended: JobState) -> Result<(), Later> {
-        while let Err(error) = self.end(record, &ended).await {
-            tracing::warn!(%error, job = %id_of(record.key), "the end of a job is not stored and told yet");
+    async fn end_surely(&self, state: &AppState, key: JobKey, job: EndedJob, end: &JobState) -> Result<(), Later> {
+        let (ended, content) = with_end(job, end);
+        let mut is_first = None;
+        loop {
+            let done = match is_first {
+                None => {
+                    self.store_end(key, &ended, content.clone(), end.name()).await.map(|first| is_first = Some(first))
+                }
+                Some(is_first) => match self.tell(key, &ended, is_first).await {
+                    Ok(()) => return Ok(()),
+                    Err(error) => Err(error),
+                },
+            };
+            let Err(error) = done else { continue };
+            tracing::warn!(%error, job = %id_of(key), "the end of a job is not stored and told yet");
             if state.is_draining() {
                 return Err(Later(Duration::ZERO));
             }
             tokio::time::sleep(PAUSE).await;
         }
-        Ok(())
     }
 }
 
@@ -259,8 +303,8 @@ enum Unready {
 }
 
 /// The work of a job: its request is read again, and the stored meshes that it names are found.
-async fn work_of(state: &AppState, job: &AcceptedJob) -> Result<Work, Unready> {
-    let record = &job.record;
+async fn work_of(state: &AppState, job: (&JobRecord, &Blobs)) -> Result<Work, Unready> {
+    let (record, blobs) = job;
     let lost = || Unready::Failed(Failure::Lost);
     let older = side(state, job, (&record.files, record.is_zip, record.mesh)).await?;
     let newer = match &record.newer {
@@ -268,7 +312,7 @@ async fn work_of(state: &AppState, job: &AcceptedJob) -> Result<Work, Unready> {
         None => None,
     };
     let document = match record.request.document {
-        Some(digest) => Some(job.blobs.get(&digest).cloned().ok_or_else(lost)?),
+        Some(digest) => Some(blobs.get(&digest).cloned().ok_or_else(lost)?),
         None => None,
     };
     recovery::work_of(state, record, document, older, newer).map_err(Unready::Failed)
@@ -277,17 +321,17 @@ async fn work_of(state: &AppState, job: &AcceptedJob) -> Result<Work, Unready> {
 /// A mesh of a job: a stored one, or one that came with the request.
 async fn side(
     state: &AppState,
-    job: &AcceptedJob,
-    (files, is_zip, mesh): (&[FileRecord], bool, Option<crate::digest::Digest>),
+    (record, blobs): (&JobRecord, &Blobs),
+    (files, is_zip, mesh): (&[FileRecord], bool, Option<Digest>),
 ) -> Result<Side, Unready> {
     if let Some(digest) = mesh {
-        let access = Access::of_job(Owner::new(&job.record.owner));
+        let access = Access::of_job(Owner::new(&record.owner));
         let stored = stored_mesh::find(state, Some(&digest.to_string()), &access).await.map_err(unready)?;
         let (bundle, memory, holds) = (stored.mesh.bundle.clone(), stored.memory.clone(), stored.holds.clone());
         return Ok(Side { bundle, memory, holds });
     }
     let found = files.iter().map(|file| {
-        let bytes = job.blobs.get(&file.digest)?.clone();
+        let bytes = blobs.get(&file.digest)?.clone();
         Some(BundleFile { path: file.path.clone(), bytes })
     });
     let files = found.collect::<Option<Vec<_>>>().ok_or(Unready::Failed(Failure::Lost))?;
