@@ -45,6 +45,8 @@ impl Sender {
             return Ok(());
         }
         match state.shared_jobs.as_ref().filter(|_| class == Class::Batch) {
+            // One that was sent before needs no queue.
+            Some(_) if self.name.is_some() => Ok(()),
             Some(shared) => shared.check(),
             None => Ok(state.jobs.would_accept(class, &self.access.owner)?),
         }

@@ -155,5 +155,5 @@ pub(super) async fn find(state: &AppState, access: &Access, id: PathName) -> Res
         None => None,
     };
     let job = job.filter(|job| access.sees(&job.owner));
-    job.ok_or_else(|| ApiError::not_found("there is no such job, or its result has expired"))
+    job.ok_or_else(shared_jobs::unknown)
 }

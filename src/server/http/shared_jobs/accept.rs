@@ -90,7 +90,7 @@ impl SharedJobs {
                 if let Err(error) = self.store.delete_job(key).await {
                     tracing::warn!(%error, "a job that was refused may be done all the same");
                 }
-                let _ = self.queue.set_note(key, &Note { has_ended: true, ..Note::default() }).await;
+                let _ = self.note_end(key).await;
             }
             return Err(error);
         }

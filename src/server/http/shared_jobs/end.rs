@@ -13,13 +13,6 @@ use crate::shared_queue::{Kind, Note, QueueError};
 use crate::shared_store::{EndedJob, Unavailable};
 
 impl SharedJobs {
-    /// Ends a job in this state, unless it has ended in another, and tells everybody.
-    pub(super) async fn end(&self, key: JobKey, job: EndedJob, state: &JobState) -> Result<(), Untold> {
-        let (ended, content) = with_end(job, state);
-        let is_first = self.store_end(key, &ended, content, state.name()).await?;
-        self.tell(key, &ended, is_first).await
-    }
-
     /// Stores the end of a job. False if it has another end.
     pub(super) async fn store_end(
         &self,
@@ -50,7 +43,7 @@ impl SharedJobs {
                 Err(error) => return Err(error.into()),
             }
         }
-        self.queue.set_note(key, &Note { has_ended: true, ..Note::default() }).await?;
+        self.note_end(key).await?;
         // Under the name of a request, there may be a new job by now.
         if ended.claim.is_some()
             && let Some(record) = self.store.job_record(key).await?
@@ -59,6 +52,11 @@ impl SharedJobs {
             return Ok(());
         }
         Ok(self.store.delete_job(key).await?)
+    }
+
+    /// Notes that a job has ended: who asks for it looks in the store then.
+    pub(super) async fn note_end(&self, key: JobKey) -> Result<(), QueueError> {
+        self.queue.set_note(key, &Note { has_ended: true, ..Note::default() }).await
     }
 }
 

@@ -4,6 +4,7 @@
 use std::sync::{Arc, Weak};
 use std::time::Duration;
 
+use super::end::with_end;
 use super::service::SharedJobs;
 use crate::digest::Digest;
 use crate::durable::ClaimRecord;
@@ -43,11 +44,26 @@ pub async fn delete(state: &AppState, job: Arc<Job>) -> Result<Arc<Job>, ApiErro
         shared.store.delete_end(key).await?;
         return Ok(job);
     }
-    if let Some(record) = shared.store.job_record(key).await? {
-        shared.end(key, EndedJob::of(&record), &JobState::Cancelled).await?;
+    let Some(record) = shared.store.job_record(key).await? else {
+        // It has ended since, or its note is what is left of it.
+        let _ = shared.note_end(key).await;
+        let ended = shared.look_up_stored(&state.memory, job.id).await?;
+        return ended.map(|(job, _)| Arc::new(job)).ok_or_else(unknown);
+    };
+    let (ended, content) = with_end(EndedJob::of(&record), &JobState::Cancelled);
+    let is_first = shared.store_end(key, &ended, content, JobState::Cancelled.name()).await?;
+    if let Err(error) = shared.tell(key, &ended, is_first).await {
+        // Who takes its message tells everybody.
+        tracing::warn!(%error, job = %job.id, "everybody is told of a cancelled job later");
     }
     // It may have ended in another way at the same moment.
-    Ok(shared.look_up(&state.memory, job.id).await?.map_or(job, Arc::new))
+    let ended = shared.look_up_end(&state.memory, job.id).await?;
+    Ok(ended.map_or(job, |(job, _)| Arc::new(job)))
+}
+
+/// The error for a job that is not there.
+pub fn unknown() -> ApiError {
+    ApiError::not_found("there is no such job, or its result has expired")
 }
 
 impl SharedJobs {
@@ -112,7 +128,7 @@ impl SharedJobs {
         // From here on, the result counts its bytes.
         drop(share);
         let state = read_end(&end, content, memory);
-        Ok(Some((mirror(id, (&owner, accepted_unix_ms), state, DRAWN), claim)))
+        Ok(Some((mirror(id, (&owner, accepted_unix_ms), state, Progress::default()), claim)))
     }
 
     async fn follow(self: Arc<Self>, memory: Arc<Memory>, job: Weak<Job>, id: JobId) {
@@ -164,9 +180,6 @@ fn mirror(id: JobId, (owner, accepted_unix_ms): (&str, u64), state: JobState, pr
 
 /// The age from which a note that says that a job has not ended is compared with the store.
 const NOTE_TRUST: Duration = Duration::from_secs(30);
-
-/// The progress of a job that has ended, of which nobody asks for the steps any more.
-const DRAWN: Progress = Progress { step: Step::Encoding, drawn: 0, views: 0 };
 
 /// The state and the progress of a job that has not ended.
 fn shown_by(note: &Note) -> (JobState, Progress) {

@@ -17,7 +17,7 @@ mod webhooks;
 mod worker;
 
 pub use accept::{accept, accept_all, sent_before};
-pub use find::{delete, find, follow};
+pub use find::{delete, find, follow, unknown};
 
 use std::sync::Arc;
 

@@ -34,7 +34,7 @@ const PAUSE: Duration = Duration::from_secs(1);
 /// Time after which a job is taken again whose picture another daemon draws at this moment.
 const SAME_PICTURE: Duration = Duration::from_millis(300);
 
-/// Time for which no other daemon draws a picture that this one draws; it is renewed with each sign of life.
+/// Time for which no other daemon draws a picture that this one draws. It is renewed while the picture is drawn.
 const LEASE: Duration = Duration::from_secs(20);
 
 /// Time between two looks at how far a job has come.
@@ -106,8 +106,9 @@ impl SharedJobs {
         let AcceptedJob { record, blobs } = match self.store.job(key, &mut admit).await.map_err(later)? {
             FoundJob::Job(job) => *job,
             FoundJob::NoRoom => return Err(Later(PAUSE)),
-            // It was taken back, cancelled, or has ended and was forgotten.
-            FoundJob::None => return Ok(()),
+            // It was taken back, cancelled, or has ended and was forgotten, perhaps while the queue was away. Its object is
+            // left alone: under the name of a request, a new job may be accepted at this moment.
+            FoundJob::None => return self.note_end(key).await.map_err(later),
             FoundJob::Damaged => {
                 let Note { owner, accepted_unix_ms, .. } = note.unwrap_or_default();
                 let record = self.store.job_record(key).await.ok().flatten();

@@ -112,6 +112,38 @@ fn without_the_queue_old_jobs_are_told_of_and_new_ones_refused() {
     assert_eq!(end_of(&server, &job)["state"], "done");
 }
 
+/// What is cancelled and forgotten while the queue is away stays so, although its messages and notes are still there.
+#[test]
+fn cancelled_without_the_queue_stays_cancelled() {
+    let Some(mut service) = Service::new() else { return };
+    let [a, b] = [service.server(&["--workers", "1"]), service.server(&["--workers", "1"])];
+    let slow = "/v1/jobs?style=wire&size=2000&samples=16";
+    let named =
+        |server: &Server, key: &str| server.request("POST", slow, &[&format!("Idempotency-Key: {key}")], CUBE_OBJ);
+    let jobs: Vec<String> = (0..10).map(|i| job_of(&named(&a, &format!("key-{i}")))).collect();
+    service.nats.kill();
+    wait("it is not ready", || b.get("/readyz").status == 503);
+    let [cancelled, forgotten] = [&jobs[8], &jobs[9]];
+    for job in [cancelled, forgotten] {
+        assert_eq!(a.request("DELETE", job, &[], b"").json()["state"], "cancelled");
+    }
+    assert_eq!(a.request("DELETE", forgotten, &[], b"").status, 200);
+    assert_eq!(b.get(cancelled).json()["state"], "cancelled");
+    b.get(forgotten).problem(404, "not_found");
+    assert_eq!(job_of(&named(&b, "key-7")), jobs[7], "a known request needs no queue");
+    named(&b, "key-new").problem(503, "queue_unavailable");
+    service.nats.start_again();
+    for job in &jobs[..8] {
+        assert_eq!(end_of(&b, job)["state"], "done");
+    }
+    wait("the queue is empty", || service.objects("jobs") == 0);
+    for server in [&a, &b] {
+        wait("it is cancelled again", || server.get(cancelled).json()["state"] == "cancelled");
+        wait("it is forgotten again", || server.get(forgotten).status == 404);
+        server.request("DELETE", forgotten, &[], b"").problem(404, "not_found");
+    }
+}
+
 /// A server that is told to end gives its jobs back at once.
 #[test]
 fn a_server_that_ends_leaves_its_jobs_to_others() {
