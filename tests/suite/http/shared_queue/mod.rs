@@ -4,7 +4,6 @@ mod faults;
 mod nats;
 mod starts;
 
-use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
@@ -13,7 +12,7 @@ use crate::http::jobs::durable::end_of;
 use crate::http::jobs::events::read_all;
 use crate::http::meshes::url;
 use crate::http::shared_store::bucket::Bucket;
-use crate::http::shared_store::{of_folder, wait};
+use crate::http::shared_store::{count_files, of_folder, wait};
 use crate::support::server::{Answer, CUBE_OBJ, Server, meshsnap};
 use crate::support::skip::{Need, skip};
 use meshsnap_server::digest::Digest;
@@ -48,12 +47,8 @@ impl Service {
 
     /// The number of objects in a folder of the store.
     fn objects(&self, folder: &str) -> usize {
-        count(&self.folder.path().join(folder))
+        count_files(&self.folder.path().join(folder))
     }
-}
-
-fn count(folder: &Path) -> usize {
-    std::fs::read_dir(folder).map_or(0, |files| files.flatten().count())
 }
 
 /// Sends a job, and returns its address.
@@ -152,7 +147,7 @@ fn any_server_accepts_does_and_tells_of_any_job() {
     for program in programs {
         let (nats, folder) = (Nats::of(program, &["-js"]), tempfile::tempdir().unwrap());
         let store = of_folder(folder.path());
-        let left = || ["jobs", "webhooks"].map(|name| count(&folder.path().join(name))).iter().sum();
+        let left = || ["jobs", "webhooks"].map(|name| count_files(&folder.path().join(name))).iter().sum();
         story(|| Server::start_with(&mut command(&nats.address(), &store, &[])), left);
     }
 }

@@ -115,8 +115,8 @@ fn what_one_server_stores_all_find_in_a_bucket() {
     assert!(bucket.names("").iter().all(|name| name.starts_with("team/a/")), "{:?}", bucket.names(""));
 }
 
-fn count_files(folder: &Path) -> usize {
-    // A file that is being written has a `#` in its name.
+pub fn count_files(folder: &Path) -> usize {
+    // A file that is being written, or that a killed server has not written to its end, has a `#` in its name.
     let is_whole = |name: &std::ffi::OsStr| !name.to_string_lossy().contains('#');
     std::fs::read_dir(folder).map_or(0, |files| files.flatten().filter(|file| is_whole(&file.file_name())).count())
 }
