@@ -551,7 +551,7 @@ impl JobRegistry {
     }
 }
 
-/// What can be found by its id is fetched later.
+/// The class of a job: one that can be found by its id is fetched later.
 fn class_of(is_kept: bool) -> Class {
     if is_kept { Class::Batch } else { Class::Interactive }
 }

@@ -122,14 +122,15 @@ pub enum Kind {
     Webhook,
 }
 
-/// What all daemons know of a job that has not ended. Nothing depends on it but what clients are told meanwhile.
+/// The common knowledge of all daemons about a job that has not ended. It decides nothing but the answers to clients
+/// meanwhile.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Note {
     /// The party that asked for it.
     pub owner: String,
     /// The time of acceptance in milliseconds since 1970.
     pub accepted_unix_ms: u64,
-    /// How often a daemon has begun it.
+    /// The number of times that a daemon has begun it.
     #[serde(default)]
     pub starts: u32,
     /// A daemon does it at this moment.

@@ -46,7 +46,7 @@ pub struct SharedQueue {
     handles: RwLock<Handles>,
 }
 
-/// What JetStream has of the queue. It is replaced when it was lost and made anew.
+/// The streams and the bucket of the queue in JetStream. They are replaced when they were lost and made anew.
 #[derive(Clone)]
 struct Handles {
     jobs: Place,

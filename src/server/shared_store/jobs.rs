@@ -58,7 +58,7 @@ pub struct EndedJob {
     pub end: EndRecord,
 }
 
-/// What was found of a job.
+/// The outcome of a look for a job.
 #[derive(Debug)]
 pub enum FoundJob {
     /// It has ended, or never was.

@@ -1,5 +1,5 @@
-//! What clients are told of the jobs of a service: mirrors, which show what the queue and the store know of a job at the
-//! time, and follow it for as long as somebody holds them.
+//! Mirrors of the jobs of a service, of which clients are told: each shows the knowledge of queue and store about a job,
+//! and follows the job for as long as somebody holds the mirror.
 
 use std::sync::{Arc, Weak};
 use std::time::Duration;

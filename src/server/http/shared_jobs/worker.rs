@@ -25,7 +25,7 @@ use crate::shared_queue::{ACK_WAIT, Delivery, Kind, Note, SIGN_EVERY};
 use crate::shared_store::{AcceptedJob, EndedJob, FoundJob, Unavailable};
 use meshsnap_render::import::BundleFile;
 
-/// How often a job may be begun by daemons that then stopped.
+/// The largest number of daemons that may begin a job and then stop.
 const STARTS_MAX: u32 = 5;
 
 /// Pause after a failure of the queue or the store.
@@ -46,7 +46,7 @@ type Blobs = BTreeMap<Digest, Bytes>;
 /// The reason why a job is not done now, by this daemon: it is given back to the queue for a while.
 struct Later(Duration);
 
-/// What is to be done with a job.
+/// The next step with a job.
 enum Ready {
     /// A worker is to do it.
     Work(Box<Work>),
@@ -126,12 +126,18 @@ impl SharedJobs {
             Ready::Ended(ended) => Some(ended),
             Ready::Work(work) => self.work(state, &record, *work, note).await?,
         };
-        let Some(ended) = ended else { return Ok(()) };
+        // This daemon may have noted since that the job runs.
+        let Some(ended) = ended else { return self.note_end(key).await.map_err(later) };
         // After so long, another daemon may have ended it, and it may be forgotten.
         if began.elapsed() > ACK_WAIT && !self.is_still(&record).await.map_err(later)? {
             return Ok(());
         }
         self.end_surely(state, key, EndedJob::of(&record), &ended).await
+    }
+
+    /// True if the end of a job is in the store.
+    async fn has_end(&self, key: JobKey) -> bool {
+        self.store.end(key, &mut |_| true).await.is_ok_and(|end| end.is_some())
     }
 
     /// True if the store has this job, and not another one under the same name.
@@ -225,8 +231,8 @@ impl SharedJobs {
             if ended.is_some() {
                 return Ok(ended);
             }
-            // Notes are no truth.
-            if told && !self.is_still(record).await.unwrap_or(true) {
+            // Notes are no truth. A job that is cancelled has its end before its object is removed.
+            if told && (self.has_end(key).await || !self.is_still(record).await.unwrap_or(true)) {
                 return Ok(None);
             }
             let shown = note_on(&job.job, &note);

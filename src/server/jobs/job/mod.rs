@@ -394,7 +394,7 @@ pub struct Job {
     pub id: JobId,
     /// The job can be found by its id, also after its end.
     pub is_kept: bool,
-    /// How it waits: what can be found by its id is fetched later.
+    /// Its class in the queue: a job that can be found by its id is fetched later.
     pub class: Class,
     /// The party that asked for it.
     pub owner: Owner,
@@ -464,7 +464,7 @@ pub struct Restored {
 pub struct Admission {
     /// The job can be found by its id.
     pub is_kept: bool,
-    /// How it waits.
+    /// Its class in the queue.
     pub class: Class,
     /// The party that asked for it.
     pub owner: Owner,
