@@ -35,6 +35,7 @@ pub struct Metrics {
     gpu_losses: IntCounter,
     overdue: IntCounter,
     quarantined: IntGauge,
+    servers: IntGauge,
     resident: IntGauge,
     shared: IntGaugeVec,
     shared_oldest: IntGauge,
@@ -71,6 +72,8 @@ pub struct Gauges {
     pub shared_queue: Vec<(&'static str, u64)>,
     /// The age of the oldest job there, seconds.
     pub shared_oldest_s: u64,
+    /// Servers that share the queue.
+    pub servers: u32,
 }
 
 impl Metrics {
@@ -130,12 +133,16 @@ impl Metrics {
             resident: registered(r, IntGauge::new("process_resident_memory_bytes", "Resident memory size in bytes.")?)?,
             shared: gauge(
                 "meshsnap_shared_queue_messages",
-                "Messages in the queue that several servers share, and those that came more than once.",
+                "Messages in the queue that several servers share, those that came more than once, and jobs that were given up.",
                 &["kind"],
             )?,
             shared_oldest: registered(
                 r,
                 IntGauge::new("meshsnap_shared_queue_oldest_seconds", "Age of the oldest job in that queue.")?,
+            )?,
+            servers: registered(
+                r,
+                IntGauge::new("meshsnap_servers", "Servers of the service that this one hears of, itself too.")?,
             )?,
             registry,
         })
@@ -205,6 +212,7 @@ impl Metrics {
             self.shared.with_label_values(&[kind]).set(to_i64(count));
         }
         self.shared_oldest.set(to_i64(gauges.shared_oldest_s));
+        self.servers.set(i64::from(gauges.servers));
         let mut text = Vec::new();
         TextEncoder::new().encode(&self.registry.gather(), &mut text)?;
         String::from_utf8(text).map_err(|error| prometheus::Error::Msg(error.to_string()))

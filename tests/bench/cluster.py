@@ -9,9 +9,13 @@ is alone draws.
     tests/bench/cluster.py duplicates   # 1,000 clients want 50 pictures
     tests/bench/cluster.py scaling      # 1, 2 and 4 servers, each with half a core; and what the queue costs per job.
                                         # With --share .2, four of them leave 2 cores something for NATS and the client
+    tests/bench/cluster.py homes        # 40 stored meshes in 6 looks each, in a random order, on 4 servers: how often a mesh
+                                        # is read, and the CPU time of it all
+    tests/bench/cluster.py model        # what servers and jobs cost NATS and the store, and what that means for 10, 100
+                                        # and 1,000 servers
 
 Options: --binary target/release/meshsnap, --jobs N, --seconds N, --nodes N, --nats nats-server, --keep FOLDER (logs stay there).
-`slow-store` needs moto, which tests/run installs: run it by target/python/bin/python.
+`slow-store` and `model` need moto, which tests/run installs: run them by target/python/bin/python.
 """
 
 import argparse
@@ -30,6 +34,7 @@ import sys
 import tempfile
 import threading
 import time
+import urllib.request
 
 CUBE = (b"v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n"
         b"f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n")
@@ -48,7 +53,9 @@ class Nats:
         self.start()
 
     def start(self):
-        arguments = [self.program, "-a", self.host, "-p", str(self.port), "-js", "-sd", os.path.join(self.folder, "nats")]
+        self.monitor = free_port()
+        arguments = [self.program, "-a", self.host, "-p", str(self.port), "-m", str(self.monitor), "-js",
+                     "-sd", os.path.join(self.folder, "nats")]
         log = open(os.path.join(self.folder, "nats.log"), "ab")
         self.process = subprocess.Popen(arguments, stdout=log, stderr=log)
         wait_for_port(self.host, self.port)
@@ -59,6 +66,20 @@ class Nats:
 
     def address(self):
         return f"nats://{self.host}:{self.port}/farm"
+
+    def spent(self):
+        """Messages in and out, their bytes, and seconds of CPU time."""
+        with urllib.request.urlopen(f"http://{self.host}:{self.monitor}/varz") as answer:
+            known = json.load(answer)
+        messages = known["in_msgs"] + known["out_msgs"]
+        return messages, known["in_bytes"] + known["out_bytes"], cpu_s(self.process.pid)
+
+
+def cpu_s(pid):
+    """CPU time of a process."""
+    with open(f"/proc/{pid}/stat", encoding="ascii") as file:
+        fields = file.read().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def wait_for_port(host, port):
@@ -274,8 +295,8 @@ def duplicates(options):
     return done == count and drawn <= 55
 
 
-def slow_store(options):
-    """A bucket behind a proxy that waits 2 s before one answer in ten and breaks one connection in twenty."""
+def bucket():
+    """Host and port of a server of S3 with the bucket `farm`."""
     from moto.server import ThreadedMotoServer
     import boto3
 
@@ -284,6 +305,18 @@ def slow_store(options):
     host, port = moto.get_host_and_port()
     boto3.client("s3", endpoint_url=f"http://{host}:{port}", region_name="us-east-1", aws_access_key_id="key",
                  aws_secret_access_key="secret").create_bucket(Bucket="farm")
+    return host, port
+
+
+def introduction(port):
+    """The variables by which a server finds the bucket."""
+    return {"AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}", "AWS_ACCESS_KEY_ID": "key", "AWS_SECRET_ACCESS_KEY": "secret",
+            "AWS_REGION": "us-east-1"}
+
+
+def slow_store(options):
+    """A bucket behind a proxy that waits 2 s before one answer in ten and breaks one connection in twenty."""
+    host, port = bucket()
     trouble = {"on": False}
 
     def pass_on(client):
@@ -314,9 +347,7 @@ def slow_store(options):
 
     threading.Thread(target=accept, daemon=True).start()
     options.store = "s3://farm/jobs"
-    environment = {"AWS_ENDPOINT_URL": f"http://127.0.0.1:{listener.getsockname()[1]}", "AWS_ACCESS_KEY_ID": "key",
-                   "AWS_SECRET_ACCESS_KEY": "secret", "AWS_REGION": "us-east-1"}
-    _, servers = service(options, 2, ["--workers", "2"], environment)
+    _, servers = service(options, 2, ["--workers", "2"], introduction(listener.getsockname()[1]))
     count, rates, jobs = min(options.jobs, 200), [], {}  # a multiple of the kinds of requests
     for is_slow in (False, True, False):
         trouble["on"] = is_slow
@@ -367,6 +398,103 @@ def scaling(options):
         cuts = statistics.quantiles(values, n=100)
         print(f"{name}: from POST to the end p50 {cuts[49]:.1f} ms, p99 {cuts[98]:.1f} ms")
     return rates[4] / rates[1] / 4 >= 0.85
+
+
+def sheet(number, side=120):
+    """A sheet with bumps, of 28,000 triangles."""
+    lines = [f"v {i} {j} {(i * number + j * 7) % 41 * .05}" for i in range(side) for j in range(side)]
+    for i in range(side - 1):
+        for j in range(side - 1):
+            first = i * side + j + 1
+            lines.append(f"f {first} {first + 1} {first + side + 1} {first + side}")
+    return "\n".join(lines).encode()
+
+
+def homes(options):
+    """Many looks of many meshes: a mesh should be read by few servers."""
+    _, servers = service(options, options.nodes, ["--workers", "2", "--worker-threads", "1"])
+    time.sleep(12)  # They hear of each other.
+    digests = []
+    for number in range(40):
+        mesh = sheet(number)
+        digests.append(hashlib.sha256(mesh).hexdigest())
+        assert servers[number % len(servers)].ask("POST", "/v1/meshes?format_in=obj", mesh)[0] == 201
+    wanted = [(digest, 128 + 16 * look) for digest in digests for look in range(6)]
+    random.Random(7).shuffle(wanted)
+
+    def send(want):
+        document = json.dumps({"mesh": want[0], "style": "wire", "image": {"width": want[1], "height": want[1]}})
+        answer = random.choice(servers).ask("POST", "/v1/jobs", document, {"Content-Type": "application/json"})
+        return answer[1]["location"] if answer[0] == 202 else sys.exit(f"refused: {answer}")
+
+    cpu, began = sum(cpu_s(server.process.pid) for server in servers), time.time()
+    with concurrent.futures.ThreadPoolExecutor(8) as pool:
+        jobs = list(pool.map(send, wanted))
+        states = list(pool.map(lambda job: end_of(servers, job, began + 300), jobs))
+    took, cpu = time.time() - began, sum(cpu_s(server.process.pid) for server in servers) - cpu
+    done = sum(bool(state) and state["state"] == "done" for state in states)
+    read = sum(server.metric("meshsnap_kept_entries", 'account="residents"') for server in servers)
+    print(f"{done} of {len(jobs)} pictures of {len(digests)} meshes in {took:.1f} s, {cpu:.1f} s of CPU time; meshes were read {read:.0f} times")
+    return done == len(jobs)
+
+
+# Writes and reads a second of one prefix of a bucket on Amazon S3, by its documentation ("Best practices design patterns:
+# optimizing Amazon S3 performance").
+S3_WRITES, S3_READS = 3500, 5500
+
+# Jobs a second of one server in the model: 8 cores, and 40 ms of one of them for a picture.
+SERVER_JOBS = 200
+
+
+def model(options):
+    """What a server that has nothing to do costs, what a job costs, and what gives out first with more of them."""
+    from werkzeug.serving import WSGIRequestHandler
+
+    asked, idle_s, jobs = {}, 20, min(options.jobs, 400)
+
+    def count(handler, *_):
+        asked[handler.command] = asked.get(handler.command, 0) + 1
+
+    def spent_in(nats, work):
+        before, stored = nats.spent(), dict(asked)
+        work()
+        after = nats.spent()
+        operations = {name: number - stored.get(name, 0) for name, number in asked.items() if number > stored.get(name, 0)}
+        return [b - a for a, b in zip(before, after)], operations
+
+    WSGIRequestHandler.log_request = count
+    _, port = bucket()
+    options.store = "s3://farm/jobs"
+    nats, servers = service(options, options.nodes, ["--quota-per-day", "1000000"], introduction(port))
+    time.sleep(15)
+    (idle, idle_bytes, idle_cpu), operations = spent_in(nats, lambda: time.sleep(idle_s))
+    per_server = [value / idle_s / options.nodes for value in (idle, idle_bytes, idle_cpu)]
+    print(f"idle, each of {options.nodes} servers: {per_server[0]:.1f} messages and {per_server[1] / 1e3:.2f} kB a second, "
+          f"{per_server[2] * 1e3:.2f} ms of NATS's CPU; the store is asked {sum(operations.values()) / idle_s / options.nodes:.2f} times: "
+          f"{operations}")
+
+    def work():
+        sent = many(servers, jobs, "style=flat&size=32")
+        ends = [end_of(servers, job, time.time() + 120) for job in sent.values()]
+        assert all(end and end["state"] == "done" for end in ends)
+
+    began = time.time()
+    (messages, size, cpu), operations = spent_in(nats, work)
+    taken = (time.time() - began) * options.nodes
+    messages, size, cpu = (max(0, value - own * taken) / jobs for value, own in zip((messages, size, cpu), per_server))
+    writes = sum(operations.get(name, 0) for name in ("PUT", "POST", "DELETE")) / jobs
+    reads = sum(operations.get(name, 0) for name in ("GET", "HEAD")) / jobs
+    print(f"a job: {messages:.1f} messages and {size / 1e3:.2f} kB of NATS, {cpu * 1e3:.2f} ms of its CPU; "
+          f"{writes:.2f} writes and {reads:.2f} reads of the store: {operations}")
+
+    print(f"with {SERVER_JOBS} jobs a second of each server:")
+    print("servers  jobs/s   NATS: messages/s    MB/s  cores   store: writes/s  reads/s  prefixes needed")
+    for number in (10, 100, 1000):
+        rate = number * SERVER_JOBS
+        values = [number * own + rate * each for own, each in zip(per_server, (messages, size, cpu))]
+        prefixes = max(rate * writes / S3_WRITES, rate * reads / S3_READS)
+        print(f"{number:7} {rate:7} {values[0]:18.0f} {values[1] / 1e6:7.1f} {values[2]:6.1f} {rate * writes:17.0f} {rate * reads:8.0f} {prefixes:16.1f}")
+    return True
 
 
 def limit(pid, cores):
@@ -456,7 +584,8 @@ def submit_with_patience(servers, number):
             return answer[1]["location"]
 
 
-RUNS = {"kills": kills, "partition": partition, "slow-store": slow_store, "duplicates": duplicates, "scaling": scaling}
+RUNS = {"kills": kills, "partition": partition, "slow-store": slow_store, "duplicates": duplicates, "scaling": scaling,
+        "homes": homes, "model": model}
 
 
 def main():

@@ -35,6 +35,7 @@ use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread::JoinHandle;
 
 use bytes::Bytes;
+use serde::{Deserialize, Serialize};
 use tokio::sync::oneshot;
 
 use super::digest::Digest;
@@ -128,6 +129,7 @@ pub struct Recovered {
 }
 
 /// A job of a process that ended.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RecoveredJob {
     /// The job as it was accepted.
     pub record: JobRecord,

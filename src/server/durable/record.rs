@@ -38,7 +38,7 @@ pub enum Change {
 }
 
 /// A job as it was accepted.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct JobRecord {
     /// Its name.
     #[serde(with = "hexadecimal")]
@@ -73,6 +73,12 @@ pub struct JobRecord {
     /// The address that hears of its end.
     #[serde(default)]
     pub webhook: Option<String>,
+    /// The request asks for a GPU.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub needs_gpu: bool,
+    /// The place of the request in a trace, as a `traceparent` of W3C Trace Context.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traceparent: Option<String>,
 }
 
 /// One of two meshes that are compared.
@@ -98,7 +104,7 @@ pub struct ClaimRecord {
 }
 
 /// A request, as it was sent.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct RequestRecord {
     /// The bytes of the document.
     #[serde(with = "optional_digest", default)]

@@ -153,21 +153,7 @@ pub(super) fn job(key: JobKey, file: &[u8]) -> JobRecord {
         upload: None,
     };
     let files = vec![FileRecord { path: "mesh".into(), digest: Digest::of(file) }];
-    JobRecord {
-        key,
-        accepted_unix_ms: 1,
-        request,
-        files,
-        is_zip: false,
-        format_in: None,
-        entry: None,
-        owner: String::new(),
-        request_id: String::new(),
-        mesh: None,
-        newer: None,
-        claim: None,
-        webhook: None,
-    }
+    JobRecord { key, accepted_unix_ms: 1, request, files, ..JobRecord::default() }
 }
 
 pub(super) fn cancelled() -> Box<EndRecord> {

@@ -232,7 +232,7 @@ async fn take_over(
     }
     recovery::recover(state, recovered);
     if let Some(jobs) = &state.shared_jobs {
-        shared_jobs::start(jobs, state);
+        shared_jobs::start(jobs, state).await;
     }
     Ok(true)
 }

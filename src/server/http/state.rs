@@ -155,7 +155,12 @@ impl AppState {
             job_ms_max: config.job_ms,
             is_local,
             cors_origins: config.cors_origins.clone(),
-            rates: Rates::new(to_u32(config.rate_per_s), to_u32(config.rate_burst), to_u32(config.quota_per_day)),
+            rates: Rates::new(
+                to_u32(config.rate_per_s),
+                to_u32(config.rate_burst),
+                to_u32(config.quota_per_day),
+                config.shared_queue.is_some(),
+            ),
             keys,
             leaving: AtomicBool::new(false),
             draining: AtomicBool::new(false),

@@ -33,6 +33,7 @@ pub use job::{
 };
 pub use progress::{Progress, Step};
 pub use storage::{JSON, Storage, end_of, name, picture_record, read_end, read_picture, record_of, value_of};
+pub use watchdog::{Quarantine, Strikes};
 pub use worker::{CpuThreads, Renderer, RendererFactory, pipeline_renderers};
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -322,6 +323,11 @@ impl Jobs {
     /// The mesh of a work that is refused, because it keeps workers busy beyond the time of a job.
     pub fn check_mesh(&self, work: &Work) -> Result<(), Refusal> {
         self.registry.quarantine.holds(&work.meshes()).map_or(Ok(()), |mesh| Err(Refusal::Quarantined { mesh }))
+    }
+
+    /// The meshes that keep workers busy.
+    pub fn quarantine(&self) -> &Quarantine {
+        &self.registry.quarantine
     }
 
     /// Number of jobs that this server does for a queue that several share: those that its workers can do, and one that

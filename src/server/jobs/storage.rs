@@ -151,6 +151,8 @@ pub fn record_of<E>(
         mesh: recipe.mesh,
         webhook: work.webhook.as_deref().map(str::to_owned),
         newer,
+        needs_gpu: work.needs_gpu(),
+        traceparent: None,
         claim: work.claim.as_ref().map(|claim| ClaimRecord { key: claim.name.key.to_string(), request: claim.request }),
     })
 }

@@ -79,19 +79,31 @@ impl Overdue {
 
 /// The meshes that keep workers busy.
 #[derive(Default)]
-pub struct Quarantine(Mutex<HashMap<Digest, Entry>>);
+pub struct Quarantine {
+    meshes: Mutex<HashMap<Digest, Entry>>,
+    /// What other servers of the same service were not told of.
+    untold: Mutex<Vec<Strikes>>,
+}
 
 /// The numbers of workers that were stuck with a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Strikes {
+    /// The mesh.
+    pub mesh: Digest,
+    /// The bytes of its files.
+    pub bytes: u64,
+    /// Workers that were stuck with the mesh by itself.
+    pub alone: u32,
+    /// Workers that were stuck with comparisons of it.
+    pub compared: u32,
+}
+
 struct Entry {
-    /// With the mesh by itself.
-    alone: u32,
-    /// With comparisons of it.
-    compared: u32,
-    bytes: u64,
+    strikes: Strikes,
     last: Instant,
 }
 
-impl Entry {
+impl Strikes {
     fn is_refused(&self, is_compared: bool) -> bool {
         self.alone >= STRIKES || is_compared && self.compared >= STRIKES
     }
@@ -105,23 +117,55 @@ impl Quarantine {
         // A mesh that is compared with itself is to blame.
         names.dedup();
         let is_compared = names.len() > 1;
-        names.into_iter().map(|(name, bytes)| (name, self.strike_one(name, bytes, is_compared))).collect()
+        let (alone, compared) = (u32::from(!is_compared), u32::from(is_compared));
+        let strikes = names.into_iter().map(|(mesh, bytes)| Strikes { mesh, bytes, alone, compared });
+        strikes
+            .map(|strike| {
+                let all = self.add(strike);
+                let mut untold = lock(&self.untold);
+                if untold.len() < MESHES_MAX {
+                    untold.push(strike);
+                }
+                (strike.mesh, if is_compared { all.compared } else { all.alone })
+            })
+            .collect()
     }
 
-    fn strike_one(&self, name: Digest, bytes: u64, is_compared: bool) -> u32 {
-        let mut meshes = self.lock();
+    /// Counts strikes of a mesh. Returns all that it has.
+    pub fn add(&self, more: Strikes) -> Strikes {
+        self.change(more, u32::saturating_add)
+    }
+
+    /// A mesh has at least these strikes.
+    pub fn learn(&self, known: Strikes) {
+        self.change(known, u32::max);
+    }
+
+    fn change(&self, with: Strikes, both: impl Fn(u32, u32) -> u32) -> Strikes {
+        let mut meshes = lock(&self.meshes);
         if meshes.len() >= MESHES_MAX
-            && !meshes.contains_key(&name)
+            && !meshes.contains_key(&with.mesh)
             && let Some(oldest) = meshes.iter().min_by_key(|(_, entry)| entry.last).map(|(name, _)| *name)
         {
             meshes.remove(&oldest);
         }
         let last = Instant::now();
-        let entry = meshes.entry(name).or_insert(Entry { alone: 0, compared: 0, bytes, last });
+        let none = Strikes { alone: 0, compared: 0, ..with };
+        let entry = meshes.entry(with.mesh).or_insert(Entry { strikes: none, last });
         entry.last = last;
-        let strikes = if is_compared { &mut entry.compared } else { &mut entry.alone };
-        *strikes += 1;
-        *strikes
+        entry.strikes.alone = both(entry.strikes.alone, with.alone);
+        entry.strikes.compared = both(entry.strikes.compared, with.compared);
+        entry.strikes
+    }
+
+    /// The strikes by this server's workers since the last call.
+    pub fn take_untold(&self) -> Vec<Strikes> {
+        std::mem::take(&mut *lock(&self.untold))
+    }
+
+    /// The strikes of all meshes.
+    pub fn all(&self) -> Vec<Strikes> {
+        lock(&self.meshes).values().map(|entry| entry.strikes).collect()
     }
 
     /// The digest of a mesh of a job that is refused.
@@ -130,22 +174,23 @@ impl Quarantine {
         meshes.iter().find_map(|mesh| {
             let bytes = mesh.bytes_len();
             // Hashing takes a while, and hardly ever is there anything to compare with.
-            if !self.lock().values().any(|entry| entry.bytes == bytes && entry.is_refused(is_compared)) {
+            let is_meant = |strikes: &Strikes| strikes.bytes == bytes && strikes.is_refused(is_compared);
+            if !lock(&self.meshes).values().any(|entry| is_meant(&entry.strikes)) {
                 return None;
             }
             let name = digest(mesh);
-            self.lock().get(&name).is_some_and(|entry| entry.is_refused(is_compared)).then_some(name)
+            lock(&self.meshes).get(&name).is_some_and(|entry| entry.strikes.is_refused(is_compared)).then_some(name)
         })
     }
 
     /// Number of meshes that are refused, by themselves or in comparisons.
     pub fn count(&self) -> usize {
-        self.lock().values().filter(|entry| entry.is_refused(true)).count()
+        lock(&self.meshes).values().filter(|entry| entry.strikes.is_refused(true)).count()
     }
+}
 
-    fn lock(&self) -> MutexGuard<'_, HashMap<Digest, Entry>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The name of a mesh, as the store of meshes has it.
@@ -191,5 +236,26 @@ mod tests {
         quarantine.strike(&[mesh("stuck"), mesh("stuck")]);
         assert_eq!([holds(&["stuck"]), holds(&["good", "stuck"])], [stuck; 2]);
         assert_eq!(quarantine.count(), 2);
+    }
+
+    #[test]
+    fn servers_learn_of_each_others_strikes() {
+        let [a, b, c] = [(); 3].map(|()| Quarantine::default());
+        let evil = [mesh("evil")];
+        assert_eq!(a.strike(&evil)[0].1, 1);
+        for strikes in a.take_untold() {
+            assert_eq!(b.add(strikes).alone, 1);
+        }
+        assert_eq!((b.strike(&evil)[0].1, b.count()), (2, 1), "the second one of both");
+        for _ in 0..2 {
+            b.all().into_iter().for_each(|strikes| c.learn(strikes));
+        }
+        assert_eq!(c.holds(&evil), Some(Digest::of(b"evil")));
+        assert_eq!((c.all(), c.take_untold()), (b.all(), Vec::new()), "what is learnt twice counts once");
+        assert_eq!(a.count(), 0, "it was not told");
+        for strikes in b.take_untold() {
+            a.add(strikes);
+        }
+        assert_eq!((a.count(), a.all()), (1, b.all()));
     }
 }

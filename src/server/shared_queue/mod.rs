@@ -7,20 +7,21 @@
 //! - The stream `NAME-jobs`, a work queue: a message for each job that has not ended, under a subject of the job's own. A
 //!   daemon takes a message, and acknowledges it when the job's end is stored. Without that, or a sign of life
 //!   within [`ACK_WAIT`], another daemon gets it.
+//! - The stream `NAME-gpu-jobs`, the same for jobs that ask for a GPU.
 //! - The stream `NAME-webhooks`, the same for the ends that a webhook is to be told of.
 //! - The key-value bucket `NAME`: a [`Note`] for each job, and the leases by which one daemon at a time does something.
+//! - The stream `NAME-dead`: jobs that were given up, with the reason, for people to look at.
+//!
+//! Beside JetStream, daemons tell each other news, and ask each other, under the subjects `NAME.news` and `NAME.questions`.
 //!
 //! Architecture invariant: nothing here knows what a job does, nor HTTP.
 
 mod address;
-#[cfg(feature = "cluster")]
-mod nats;
-#[cfg(not(feature = "cluster"))]
-#[path = "nats_absent.rs"]
+#[cfg_attr(not(feature = "cluster"), path = "nats/absent.rs")]
 mod nats;
 
 pub use address::{Address, AddressError};
-pub use nats::{Delivery, Following, SharedQueue};
+pub use nats::{Delivery, Following, Heard, News, Question, SharedQueue};
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -81,11 +82,19 @@ pub enum OpenError {
         needed: String,
     },
     /// JetStream does not make what the queue needs.
-    #[error("the shared queue {address} cannot be set up: {cause}")]
+    #[error("the shared queue {address} cannot be used: {cause}")]
     Setup {
         /// The address.
         address: String,
         /// The answer.
+        cause: String,
+    },
+    /// It cannot be reached.
+    #[error("the shared queue {address} cannot be reached: {cause}")]
+    Unreachable {
+        /// The address.
+        address: String,
+        /// The cause.
         cause: String,
     },
     /// The file of credentials or certificates cannot be used.
@@ -118,8 +127,15 @@ pub struct QueueSettings {
 pub enum Kind {
     /// A job is to be done.
     Job,
+    /// A job is to be done by a daemon with a GPU.
+    GpuJob,
     /// A webhook is to be told of a job's end.
     Webhook,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Job, Self::GpuJob, Self::Webhook];
 }
 
 /// The common knowledge of all daemons about a job that has not ended. It decides nothing but the answers to clients
@@ -153,12 +169,16 @@ pub struct Note {
 /// The load of the queue, of all daemons.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct QueueLoad {
-    /// Jobs that wait or are being done.
+    /// Jobs that wait or are being done, without those that ask for a GPU.
     pub jobs: u64,
+    /// Those that do.
+    pub gpu_jobs: u64,
     /// Ends that webhooks have not been told of.
     pub webhooks: u64,
-    /// Jobs that were given to a daemon and are not acknowledged, some more than once.
+    /// Jobs that were given to a daemon more than once, and are not acknowledged.
     pub redelivered: u64,
+    /// Jobs that were given up.
+    pub dead: u64,
     /// The age of the oldest job.
     pub oldest: Duration,
 }

@@ -1,4 +1,5 @@
-//! Traces for OpenTelemetry: a span for each request, one for its job below it, and one for each stage of the job.
+//! Traces for OpenTelemetry: a span for each request, one for its job below it, and one for each stage of the job. A job
+//! that another server does has a span of that server in between.
 //!
 //! They are sent by OTLP over HTTP, in batches, from a thread of their own. The variables of the OpenTelemetry
 //! specification set the address, the share of traces that is sent, and the service's name: `OTEL_EXPORTER_OTLP_ENDPOINT`,
@@ -10,7 +11,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
-use opentelemetry::propagation::{Extractor, TextMapPropagator as _};
+use opentelemetry::propagation::{Extractor, Injector, TextMapPropagator as _};
 use opentelemetry::trace::{
     Span as _, SpanBuilder, SpanKind, Status, TraceContextExt as _, Tracer as _, TracerProvider as _,
 };
@@ -57,6 +58,13 @@ impl Trace {
     pub fn of_headers<'h>(header: impl Fn(&str) -> Option<&'h str>) -> Self {
         let headers = || Headers { parent: header("traceparent"), state: header("tracestate") };
         Self(SENDING.get().map(|_| TraceContextPropagator::new().extract(&headers())))
+    }
+
+    /// The place as a `traceparent`. None: there is no trace.
+    pub fn header(&self) -> Option<String> {
+        let mut header = Header(None);
+        TraceContextPropagator::new().inject_context(self.0.as_ref()?, &mut header);
+        header.0
     }
 
     /// Puts a new span below this place.
@@ -158,6 +166,17 @@ pub fn finish() {
 struct Headers<'h> {
     parent: Option<&'h str>,
     state: Option<&'h str>,
+}
+
+/// The header `traceparent`.
+struct Header(Option<String>);
+
+impl Injector for Header {
+    fn set(&mut self, key: &str, value: String) {
+        if key == "traceparent" {
+            self.0 = Some(value);
+        }
+    }
 }
 
 impl Extractor for Headers<'_> {

@@ -120,6 +120,7 @@ const OPERATIONS: &[(&str, Outcome)] = &[
     ("meshsnap serve --store s3://", Elsewhere("`http::shared_store` does so")),
     ("nats-server -js", Elsewhere("`http::shared_queue` does so")),
     ("meshsnap serve --queue nats://", Elsewhere("`http::shared_queue` does so")),
+    ("meshsnap jobs --dead --queue", Elsewhere("`http::shared_queue::service` does so")),
 ];
 
 const PIPELINES: &[(&str, Outcome)] = &[

@@ -11,10 +11,10 @@ fn folder() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/deploy"))
 }
 
-/// True for a variable that sets something: its flag is in the help.
+/// True for a variable that sets something: its flag is in the help, before its value or, of a switch, a bracket.
 fn is_known(variable: &str, help: &str) -> bool {
     let flag = variable.strip_prefix("MESHSNAP_").map(|name| name.to_ascii_lowercase().replace('_', "-"));
-    flag.is_some_and(|flag| help.contains(&format!("  --{flag} ")))
+    flag.is_some_and(|flag| [" ", "["].iter().any(|end| help.contains(&format!("  --{flag}{end}"))))
 }
 
 fn help() -> String {
@@ -32,21 +32,23 @@ fn manifests_are_valid_and_set_what_serve_knows() {
     let output = Command::new(python).env("PYTHONDONTWRITEBYTECODE", "1").arg(script).arg(folder()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(found["schemas"], 3);
+    // Kubernetes: three kinds for one server and four for several; Compose: two files.
+    assert_eq!(found["schemas"], 9);
+    assert_eq!((&found["scalers"], &found["images"]), (&1.into(), &3.into()));
     let help = help();
     let mut settings = 0;
     for (variable, _) in found["settings"].as_object().unwrap() {
         assert!(is_known(variable, &help), "{variable} is no setting");
         settings += 1;
     }
-    assert_eq!(settings, 3);
+    assert_eq!(settings, 7);
     let server = Server::start(&[]);
     let mut probes = 0;
     for path in found["probes"].as_array().unwrap() {
         assert_eq!(server.get(path.as_str().unwrap()).status, 200, "{path}");
         probes += 1;
     }
-    assert_eq!(probes, 3);
+    assert_eq!(probes, 6);
 }
 
 #[test]

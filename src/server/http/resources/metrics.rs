@@ -23,7 +23,13 @@ pub async fn get(State(state): State<Arc<AppState>>) -> Result<Response, ApiErro
     if let Some(jobs) = &state.shared_jobs
         && let Ok(Some(load)) = tokio::time::timeout(LOOK_TIME, jobs.load()).await
     {
-        gauges.shared_queue = vec![("jobs", load.jobs), ("webhooks", load.webhooks), ("redelivered", load.redelivered)];
+        gauges.shared_queue = vec![
+            ("jobs", load.jobs),
+            ("gpu-jobs", load.gpu_jobs),
+            ("webhooks", load.webhooks),
+            ("redelivered", load.redelivered),
+            ("dead", load.dead),
+        ];
         gauges.shared_oldest_s = load.oldest.as_secs();
     }
     let text = state.metrics.text(&gauges).map_err(|error| {
@@ -64,6 +70,7 @@ fn gauges(state: &AppState) -> Gauges {
         gpu_losses: state.gpu.losses_in_all(),
         resident_bytes: resident_bytes(),
         shared_queue: Vec::new(),
+        servers: state.shared_jobs.as_ref().map_or(1, |jobs| jobs.servers()),
         shared_oldest_s: 0,
     }
 }

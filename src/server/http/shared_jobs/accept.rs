@@ -16,6 +16,7 @@ use crate::http::state::AppState;
 use crate::jobs::{ClaimName, Job, JobId, JobState, Progress, Refusal, Restored, Work, record_of, unix_ms};
 use crate::shared_queue::{Kind, Note, QueueError};
 use crate::shared_store::AcceptedJob;
+use crate::telemetry::traces::Trace;
 
 /// Objects that are written at a time.
 const WRITES: usize = 8;
@@ -35,9 +36,10 @@ pub async fn accept_all(state: &AppState, works: Vec<Work>) -> Result<Vec<Arc<Jo
     works.iter().try_for_each(|work| state.jobs.check_mesh(work))?;
     shared.check()?;
     let shared = shared.clone();
+    let traceparent = Trace::here().header();
     // It goes on when the client hangs up, so that a form is accepted as a whole.
     let accepting = tokio::spawn(async move {
-        let accepted = shared.accept(works).await;
+        let accepted = shared.accept(works, traceparent).await;
         accepted.map(|records| records.iter().map(|record| Arc::new(queued(record))).collect())
     });
     accepting.await.unwrap_or_else(|_| Err(ApiError::internal()))
@@ -50,10 +52,14 @@ pub async fn sent_before(state: &AppState, name: &ClaimName, request: Digest) ->
     if claim.is_none_or(|claim| claim.request != request) {
         return Err(idempotency::reused());
     }
-    if !job.state().is_final() {
+    // What is not there has ended in this moment.
+    if !job.state().is_final()
+        && let Some(record) = shared.store.job_record(job.id.key()).await?
+    {
         // The server that stored it may not have sent its message yet, and may find the queue full. The same message
         // twice is one.
-        let sent = shared.queue.send(Kind::Job, job.id.key(), &message_name(job.id.key(), job.accepted_unix_ms)).await;
+        let sent =
+            shared.queue.send(kind_of(&record), record.key, &message_name(record.key, job.accepted_unix_ms)).await;
         if matches!(sent, Err(QueueError::Full)) {
             return Err(QueueError::Full.into());
         }
@@ -75,10 +81,15 @@ fn queued(record: &JobRecord) -> Job {
 }
 
 impl SharedJobs {
-    async fn accept(self: Arc<Self>, works: Vec<Work>) -> Result<Vec<JobRecord>, ApiError> {
+    async fn accept(
+        self: Arc<Self>,
+        works: Vec<Work>,
+        traceparent: Option<String>,
+    ) -> Result<Vec<JobRecord>, ApiError> {
         // Hashing many bytes would block other requests. The works keep the memory of their bytes until all is written.
         let reading = tokio::task::spawn_blocking(move || {
-            let jobs: Vec<Arc<AcceptedJob>> = works.iter().map(|work| Arc::new(read(work))).collect();
+            let jobs: Vec<Arc<AcceptedJob>> =
+                works.iter().map(|work| Arc::new(read(work, traceparent.as_deref()))).collect();
             (works, jobs)
         });
         let (works, jobs) = reading.await.map_err(|_| ApiError::internal())?;
@@ -128,7 +139,7 @@ impl SharedJobs {
     /// kept all the same: the sweep sends it.
     async fn announce(&self, record: &JobRecord) -> Result<(), QueueError> {
         let _ = self.queue.set_note(record.key, &note_of(record)).await;
-        match self.queue.send(Kind::Job, record.key, &message_name(record.key, record.accepted_unix_ms)).await {
+        match self.queue.send(kind_of(record), record.key, &message_name(record.key, record.accepted_unix_ms)).await {
             Err(QueueError::Full) => Err(QueueError::Full),
             Err(error) => {
                 tracing::warn!(%error, job = %JobId::from_key(record.key), "a job will be sent to the queue later");
@@ -137,6 +148,11 @@ impl SharedJobs {
             Ok(()) => Ok(()),
         }
     }
+}
+
+/// The kind of the message of a job.
+pub fn kind_of(record: &JobRecord) -> Kind {
+    if record.needs_gpu { Kind::GpuJob } else { Kind::Job }
 }
 
 /// The note on a job that waits.
@@ -150,13 +166,14 @@ pub fn message_name(key: JobKey, unix_ms: u64) -> String {
 }
 
 /// The job as it is stored. A mesh that is stored is not copied into it.
-fn read(work: &Work) -> AcceptedJob {
+fn read(work: &Work, traceparent: Option<&str>) -> AcceptedJob {
     let mut blobs = BTreeMap::new();
     let id = work.claim.as_ref().map_or_else(JobId::fresh, |claim| id_of(&claim.name));
-    let Ok(record) = record_of((id, unix_ms()), work, false, &mut |bytes, _| {
+    let Ok(mut record) = record_of((id, unix_ms()), work, false, &mut |bytes, _| {
         let digest = Digest::of(bytes);
         blobs.insert(digest, bytes.clone());
         Ok::<_, Infallible>(digest)
     });
+    record.traceparent = traceparent.map(str::to_owned);
     AcceptedJob { record, blobs }
 }

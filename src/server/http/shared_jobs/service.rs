@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use tokio::sync::Semaphore;
 
+use super::others::Others;
 use crate::durable::JobKey;
 use crate::http::error::{ApiError, ErrorKind};
 use crate::http::hear_of_ends::Settlements;
@@ -29,6 +30,8 @@ pub struct SharedJobs {
     pub(super) settlements: Arc<Settlements>,
     /// The time for which ends are kept.
     pub(super) end_time: Duration,
+    /// The other daemons.
+    pub(super) others: Others,
 }
 
 impl SharedJobs {
@@ -49,6 +52,7 @@ impl SharedJobs {
             telling: Arc::new(Semaphore::new(TELLING_MAX)),
             settlements,
             end_time,
+            others: Others::default(),
         }
     }
 
@@ -63,6 +67,11 @@ impl SharedJobs {
     /// Waits, once the server drains, until this daemon has no job of the queue any more.
     pub async fn idle(&self) {
         let _ = self.slots.acquire_many(self.slot_count).await;
+    }
+
+    /// The number of daemons of the service.
+    pub fn servers(&self) -> u32 {
+        self.others.count()
     }
 
     /// The load of the queue, if it can be reached.

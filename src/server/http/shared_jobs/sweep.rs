@@ -2,14 +2,17 @@
 //! it again, and old ends are forgotten. A message can be missing because a daemon stopped while it accepted the job, or
 //! because JetStream has lost it: it tells clients that a message is kept before it is on the disk.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::accept::message_name;
+use super::accept::{kind_of, message_name};
 use super::service::SharedJobs;
+use crate::durable::JobKey;
 use crate::http::error::ApiError;
 use crate::jobs::unix_ms;
 use crate::shared_queue::Kind;
+use crate::shared_store::Ages;
 
 /// Time between two looks.
 const LOOK_EVERY: Duration = Duration::from_secs(10);
@@ -42,8 +45,8 @@ pub async fn run(shared: Arc<SharedJobs>) {
                 continue;
             }
         }
-        warn(shared.send_again(Kind::Job).await);
-        warn(shared.send_again(Kind::Webhook).await);
+        warn(shared.send_jobs_again().await);
+        warn(shared.send_webhooks_again().await);
         if forgot.elapsed() >= FORGET_EVERY {
             forgot = Instant::now();
             warn(shared.forget_old_ends().await);
@@ -67,25 +70,53 @@ impl SharedJobs {
         Ok(())
     }
 
-    /// Sends messages about objects that have none. The objects were listed before the messages are, so that none is
+    /// Sends messages about jobs that have none. The objects were listed before the messages are, so that none is
     /// missing because it was written in between.
-    async fn send_again(&self, kind: Kind) -> Result<(), ApiError> {
-        let objects = match kind {
-            Kind::Job => self.store.jobs().await?,
-            Kind::Webhook => self.store.owed_webhooks().await?,
-        };
-        if objects.is_empty() {
+    async fn send_jobs_again(&self) -> Result<(), ApiError> {
+        let jobs = self.store.jobs().await?;
+        if jobs.is_empty() {
             return Ok(());
         }
-        let live = self.queue.live(kind).await?;
+        let mut live = self.queue.live(Kind::Job).await?;
+        live.extend(self.queue.live(Kind::GpuJob).await?);
         let mut count = 0;
-        for (key, _) in objects.into_iter().filter(|(key, age)| *age > AGE_MIN && !live.contains(key)) {
-            self.queue.send(kind, key, &message_name(key, unix_ms())).await?;
+        for key in missing(jobs, &live) {
+            // One that cannot be read is ended by the server that takes its message.
+            let kind = self.store.job_record(key).await.ok().flatten().map_or(Kind::Job, |record| kind_of(&record));
+            self.send_again(kind, key).await?;
             count += 1;
         }
-        if count > 0 {
-            tracing::warn!(count, "the queue had lost messages, which are sent again");
-        }
+        report(count);
         Ok(())
+    }
+
+    /// The same for webhooks.
+    async fn send_webhooks_again(&self) -> Result<(), ApiError> {
+        let owed = self.store.owed_webhooks().await?;
+        if owed.is_empty() {
+            return Ok(());
+        }
+        let live = self.queue.live(Kind::Webhook).await?;
+        let mut count = 0;
+        for key in missing(owed, &live) {
+            self.send_again(Kind::Webhook, key).await?;
+            count += 1;
+        }
+        report(count);
+        Ok(())
+    }
+
+    async fn send_again(&self, kind: Kind, key: JobKey) -> Result<(), ApiError> {
+        Ok(self.queue.send(kind, key, &message_name(key, unix_ms())).await?)
+    }
+}
+
+fn missing(objects: Ages, live: &HashSet<JobKey>) -> impl Iterator<Item = JobKey> {
+    objects.into_iter().filter(|(key, age)| *age > AGE_MIN && !live.contains(key)).map(|(key, _)| key)
+}
+
+fn report(count: usize) {
+    if count > 0 {
+        tracing::warn!(count, "the queue had lost messages, which are sent again");
     }
 }

@@ -12,17 +12,18 @@ use super::accept::note_of;
 use super::end::with_end;
 use super::service::{SharedJobs, id_of};
 use crate::digest::Digest;
-use crate::durable::{FileRecord, JobKey, JobRecord};
+use crate::durable::{ErrorRecord, FileRecord, JobKey, JobRecord, RecoveredJob, RequestRecord};
 use crate::http::address::render_key;
-use crate::http::error::{ApiError, record_of};
+use crate::http::error::{self, ApiError, record_of};
 use crate::http::recovery::{self, Side};
 use crate::http::state::AppState;
 use crate::http::stored_mesh;
-use crate::jobs::{Failure, Job, JobState, Owner, Task, Work};
+use crate::jobs::{Failure, Job, JobState, Owner, Task, Work, end_of};
 use crate::keys::Access;
 use crate::memory::Account;
 use crate::shared_queue::{ACK_WAIT, Delivery, Kind, Note, SIGN_EVERY};
 use crate::shared_store::{AcceptedJob, EndedJob, FoundJob, Unavailable};
+use crate::telemetry::traces::Trace;
 use meshsnap_render::import::BundleFile;
 
 /// The largest number of daemons that may begin a job and then stop.
@@ -54,26 +55,50 @@ enum Ready {
     Ended(JobState),
 }
 
-/// Takes jobs until the server drains.
-pub async fn run(shared: Arc<SharedJobs>, state: Arc<AppState>) {
-    while let Ok(permit) = shared.slots.clone().acquire_owned().await {
+/// Takes jobs of a kind until the server drains.
+pub async fn run(shared: Arc<SharedJobs>, state: Arc<AppState>, kind: Kind) {
+    loop {
+        // No slot is kept free for jobs that may not come.
+        let permit = match kind {
+            Kind::GpuJob => None,
+            _ => shared.slots.clone().acquire_owned().await.ok(),
+        };
         if state.is_draining() {
             return;
         }
-        match shared.queue.take(Kind::Job).await {
-            Ok(None) => {}
-            Ok(Some(delivery)) => {
-                tokio::spawn(shared.clone().serve(state.clone(), delivery, permit));
-            }
+        if kind == Kind::GpuJob && shared.others.lacks_gpu() && shared.others.may_have_gpu() {
+            tokio::time::sleep(PAUSE).await;
+            continue;
+        }
+        let taken = match shared.queue.take(kind).await {
+            Ok(taken) => taken,
             Err(error) => {
                 tracing::warn!(%error, "no job was taken");
                 tokio::time::sleep(PAUSE).await;
+                continue;
             }
+        };
+        let Some(delivery) = taken else { continue };
+        let permit = match permit {
+            Some(permit) => Some(permit),
+            None => shared.slot_for(&delivery).await,
+        };
+        if let Some(permit) = permit {
+            tokio::spawn(shared.clone().serve(state.clone(), delivery, permit));
         }
     }
 }
 
 impl SharedJobs {
+    /// A slot for a job that was taken without one. If none is free soon, the job is given back.
+    async fn slot_for(&self, delivery: &Delivery) -> Option<OwnedSemaphorePermit> {
+        let permit = tokio::time::timeout(SIGN_EVERY, self.slots.clone().acquire_owned()).await;
+        if permit.is_err() {
+            delivery.give_back(Duration::ZERO).await;
+        }
+        permit.ok()?.ok()
+    }
+
     /// Does the job of a message, and gives signs of life meanwhile.
     async fn serve(self: Arc<Self>, state: Arc<AppState>, delivery: Delivery, _permit: OwnedSemaphorePermit) {
         let Some(key) = delivery.key() else { return delivery.end().await };
@@ -110,11 +135,12 @@ impl SharedJobs {
             // left alone: under the name of a request, a new job may be accepted at this moment.
             FoundJob::None => return self.note_end(key).await.map_err(later),
             FoundJob::Damaged => {
-                let Note { owner, accepted_unix_ms, .. } = note.unwrap_or_default();
-                let record = self.store.job_record(key).await.ok().flatten();
-                let unknown = EndedJob { owner, accepted_unix_ms, ..EndedJob::default() };
-                let job = record.map_or(unknown, |record| EndedJob::of(&record));
-                return self.end_surely(state, key, job, &failed(Failure::Lost)).await;
+                let Note { owner, accepted_unix_ms, starts, .. } = note.unwrap_or_default();
+                let unknown = JobRecord { key, owner, accepted_unix_ms, ..JobRecord::default() };
+                let record = self.store.job_record(key).await.ok().flatten().unwrap_or(unknown);
+                let lost = failed(Failure::Lost);
+                self.bury(&record, starts, &lost).await;
+                return self.end_surely(state, key, EndedJob::of(&record), &lost).await;
             }
         };
         let note = Note { starts: note.map_or(0, |note| note.starts), ..note_of(&record) };
@@ -123,9 +149,22 @@ impl SharedJobs {
         drop((memory, blobs));
         let began = Instant::now();
         let ended = match ready {
-            Ready::Ended(ended) => Some(ended),
-            Ready::Work(work) => self.work(state, &record, *work, note).await?,
+            Ready::Ended(ended) => {
+                self.bury(&record, note.starts, &ended).await;
+                Some(ended)
+            }
+            Ready::Work(work) => self.work(state, &record, *work, note.clone()).await?,
         };
+        if let Some(JobState::Failed(failure)) = &ended
+            && failure.is_without_gpu()
+        {
+            self.others.note_no_gpu();
+            if self.others.may_have_gpu() {
+                // It was not begun.
+                let _ = self.queue.set_note(key, &note).await;
+                return Err(Later(Duration::ZERO));
+            }
+        }
         // This daemon may have noted since that the job runs.
         let Some(ended) = ended else { return self.note_end(key).await.map_err(later) };
         // After so long, another daemon may have ended it, and it may be forgotten.
@@ -220,7 +259,10 @@ impl SharedJobs {
         let key = record.key;
         // Its webhook is told by the service.
         let work = Work { webhook: None, ..work };
-        let job = Waiting { job: state.jobs.do_shared((id_of(key), record.accepted_unix_ms), work), state };
+        let span = tracing::info_span!("shared job", job = %id_of(key), request_id = record.request_id);
+        Trace::of_headers(|name| record.traceparent.as_deref().filter(|_| name == "traceparent")).adopt(&span);
+        let job = span.in_scope(|| state.jobs.do_shared((id_of(key), record.accepted_unix_ms), work));
+        let job = Waiting { job, state };
         let mut notes = self.queue.follow(key).await.map_err(|_| Later(PAUSE))?;
         let mut looks: u32 = 0;
         loop {
@@ -250,6 +292,33 @@ impl SharedJobs {
         }
     }
 
+    /// Keeps a job that is given up for people to look at.
+    async fn bury(&self, record: &JobRecord, starts: u32, end: &JobState) {
+        let is_given_up = |failure: &Failure| matches!(failure, Failure::Crashed { .. } | Failure::Lost);
+        if !matches!(end, JobState::Failed(failure) if is_given_up(failure)) {
+            return;
+        }
+        let described = |failure: &Failure| match failure {
+            // Clients are told of an internal error.
+            Failure::Lost => {
+                ErrorRecord { code: "lost".to_owned(), detail: failure.to_string(), ..error::record(failure) }
+            }
+            _ => error::record(failure),
+        };
+        let end = end_of(end, None, described);
+        let mut letter = RecoveredJob { record: record.clone(), starts, end: Some(end) };
+        let mut bytes = serde_json::to_vec(&letter).unwrap_or_default();
+        if bytes.len() > LETTER_BYTES_MAX {
+            letter.record.request = RequestRecord { kind: letter.record.request.kind, ..RequestRecord::default() };
+            letter.record.files.truncate(1);
+            letter.record.newer = None;
+            bytes = serde_json::to_vec(&letter).unwrap_or_default();
+        }
+        if let Err(error) = self.queue.bury(record.key, bytes).await {
+            tracing::warn!(%error, job = %id_of(record.key), "a job that is given up is not among the dead letters");
+        }
+    }
+
     /// Ends a job, however long the store or the queue cannot be reached.
     async fn end_surely(&self, state: &AppState, key: JobKey, job: EndedJob, end: &JobState) -> Result<(), Later> {
         let (ended, content) = with_end(job, end);
@@ -273,6 +342,9 @@ impl SharedJobs {
         }
     }
 }
+
+/// The longest dead letter. NATS takes messages of 1 MB.
+const LETTER_BYTES_MAX: usize = 512 << 10;
 
 /// Looks at a job after which the lease of its picture is renewed: every five seconds.
 const LOOKS_PER_LEASE: u32 = 50;

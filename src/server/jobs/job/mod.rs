@@ -2,6 +2,9 @@
 //! its result.
 
 mod mirror;
+mod work;
+
+pub use work::{Checking, Comparing, Newer, Recipe, Task, Work};
 
 use std::fmt;
 use std::sync::atomic::AtomicU64;
@@ -19,13 +22,10 @@ use crate::digest::Digest;
 use crate::durable::{ErrorRecord, Hold, JobKey};
 use crate::memory::{Account, Keeping, Memory, MemoryShare, counted};
 use crate::telemetry::traces::Trace;
-use meshsnap_inspect::check::RuleSet;
-use meshsnap_render::backend::{BackendKind, DrawTimes};
+use meshsnap_render::backend::{BackendKind, DrawError, DrawTimes};
 use meshsnap_render::image::ImageFormat;
-use meshsnap_render::import::{Bundle, Format};
-use meshsnap_render::limits::{Budget, Deadline, Lend, Limits};
+use meshsnap_render::limits::Deadline;
 use meshsnap_render::pipeline::{DrawReport, Output, QualitySelection, RenderError, Stage};
-use meshsnap_render::spec::Spec;
 use meshsnap_render::warning::Warning;
 
 /// The name of a job. Later ids sort after earlier ones.
@@ -65,115 +65,6 @@ impl fmt::Display for JobId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.hyphenated().fmt(f)
     }
-}
-
-/// The work of one job.
-#[derive(Debug)]
-pub struct Work {
-    /// The mesh and the files beside it.
-    pub bundle: Bundle,
-    /// The mesh's format. None: found from the bytes.
-    pub format_in: Option<Format>,
-    /// The name under which the mesh may stay in memory as it was read; None if it is not to.
-    pub mesh_key: Option<String>,
-    /// The task on the mesh.
-    pub task: Task,
-    /// The memory of `bundle`, shared with all other holders of the same bytes.
-    pub memory: Arc<MemoryShare>,
-    /// The memory that a worker borrows for it. None until one begins it.
-    pub lender: Option<Arc<dyn Lend>>,
-    /// The request that `task` was read from, so that it can be read again after a restart. None for work that
-    /// nobody fetches later.
-    pub recipe: Option<Arc<Recipe>>,
-    /// The party that asks for it.
-    pub owner: Owner,
-    /// The id of the request, for the log.
-    pub request_id: Arc<str>,
-    /// The bundle's files in the data folder, if they are there already.
-    pub holds: Arc<[Arc<Hold>]>,
-    /// The name that the client gave the request.
-    pub claim: Option<Arc<Claim>>,
-    /// The address that hears of its end.
-    pub webhook: Option<Arc<str>>,
-}
-
-impl Work {
-    /// An unspent budget, of which all that is spent is borrowed as the job's memory.
-    pub fn budget(&self, limits: &Limits) -> Budget {
-        Budget::lent(limits, self.lender.clone())
-    }
-
-    /// Its mesh, and the newer one of a comparison.
-    pub fn meshes(&self) -> Vec<Bundle> {
-        let newer = if let Task::Diff(comparing) = &self.task { Some(&comparing.newer.bundle) } else { None };
-        [&self.bundle].into_iter().chain(newer).cloned().collect()
-    }
-}
-
-/// A request for a picture, a check or a comparison, as it was sent.
-#[derive(Clone, Debug, Default)]
-pub struct Recipe {
-    /// The bytes of the document.
-    pub document: Option<Bytes>,
-    /// The dotted keys.
-    pub overrides: Box<[(String, String)]>,
-    /// The stored mesh that the document names.
-    pub mesh: Option<Digest>,
-}
-
-/// Tasks on a mesh.
-#[derive(Clone, Debug)]
-pub enum Task {
-    /// Draw a picture.
-    Draw(Box<Spec>),
-    /// Judge it by rules.
-    Check(Box<Checking>),
-    /// Compare it with a newer one.
-    Diff(Box<Comparing>),
-    /// Write a report on its content.
-    Inspect {
-        /// The time within its animation, as in [`Spec::time_s`].
-        time_s: Option<f64>,
-    },
-}
-
-/// A mesh that is judged.
-#[derive(Clone, Debug)]
-pub struct Checking {
-    /// The rules.
-    pub rules: RuleSet,
-    /// All places of faults are listed, not the first few.
-    pub all_places: bool,
-    /// The name of the upload.
-    pub digest: Digest,
-    /// A broken rule of level `error` is an answer of 422.
-    pub may_fail: bool,
-}
-
-/// A mesh that is compared with a newer one.
-#[derive(Clone, Debug)]
-pub struct Comparing {
-    /// The newer mesh.
-    pub newer: Newer,
-    /// The largest distance that counts as the same, file units.
-    pub max_distance: Option<f64>,
-    /// The picture that is the answer. None: the answer is JSON.
-    pub picture: Option<Box<Spec>>,
-    /// A difference is an answer of 422.
-    pub may_fail: bool,
-}
-
-/// The newer one of two meshes.
-#[derive(Clone, Debug)]
-pub struct Newer {
-    /// The mesh and the files beside it.
-    pub bundle: Bundle,
-    /// The memory of `bundle`.
-    pub memory: Arc<MemoryShare>,
-    /// The bundle's files in the data folder, if they are there already.
-    pub holds: Arc<[Arc<Hold>]>,
-    /// Its name, if it is stored.
-    pub mesh: Option<Digest>,
 }
 
 /// The outcome of a task.
@@ -250,6 +141,13 @@ pub struct Finished {
     pub draw_times: DrawTimes,
 }
 
+impl Failure {
+    /// True if the request asks for a GPU, and this server has none.
+    pub fn is_without_gpu(&self) -> bool {
+        matches!(self, Self::Render(RenderError::Draw(DrawError::NoGpu(_))))
+    }
+}
+
 impl Finished {
     /// Takes over the pipeline's output.
     pub fn new(output: Output, timings: Timings) -> Self {
@@ -321,8 +219,8 @@ pub enum Failure {
         /// How often.
         times: u32,
     },
-    /// The data folder has lost what the job needs.
-    #[error("the data folder has lost the files of this job")]
+    /// The data folder, or the store of the service, has lost what the job needs.
+    #[error("what this job needs is lost or damaged where it was kept")]
     Lost,
     /// The failure of an earlier process.
     #[error("{}", .0.detail)]

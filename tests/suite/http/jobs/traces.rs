@@ -6,6 +6,8 @@ use std::net::TcpListener;
 use std::process::Command;
 use std::sync::{Arc, Mutex};
 
+use crate::http::jobs::durable::end_of;
+use crate::http::shared_queue::{Service, job_of};
 use crate::support::server::{CUBE_OBJ, Server, meshsnap};
 
 /// A collector on a free port of loopback, which answers with one status.
@@ -222,6 +224,44 @@ fn requests_jobs_and_stages_are_spans_of_the_callers_trace() {
     }
     assert_eq!(stages, 11);
     assert!(of("POST /v1/jobs", "later").trace != request.trace, "a trace of its own");
+}
+
+/// A job that was accepted by one server, and done by another.
+#[test]
+fn traces_go_on_at_other_servers() {
+    let Some(service) = Service::new() else { return };
+    let collector = Collector::start("200 OK");
+    let start = |name: &str| {
+        let mut command = service.command(&[]);
+        command.env("OTEL_EXPORTER_OTLP_ENDPOINT", &collector.endpoint).env("OTEL_BSP_SCHEDULE_DELAY", "100");
+        Server::start_with(command.env("OTEL_RESOURCE_ATTRIBUTES", format!("host.name={name}")))
+    };
+    let mut servers = [start("a"), start("b")];
+    let caller = format!("traceparent: 00-{TRACE}-{CALLER}-01");
+    let jobs: Vec<String> = (0..6)
+        .map(|i| {
+            let path = format!("/v1/jobs?size={}", 32 + i);
+            job_of(&servers[i % 2].request("POST", &path, &[&caller, &format!("X-Request-Id: job-{i}")], CUBE_OBJ))
+        })
+        .collect();
+    for job in &jobs {
+        assert_eq!(end_of(&servers[0], job)["state"], "done");
+    }
+    for server in &mut servers {
+        server.terminate();
+        assert!(server.wait().success());
+    }
+    let (spans, _) = collector.spans();
+    for i in 0..6 {
+        let of = |name: &str| {
+            let is_meant = |s: &&Span| s.name == name && *s.attribute("request_id") == Value::Text(format!("job-{i}"));
+            spans.iter().find(is_meant).unwrap_or_else(|| panic!("{name} of {i} in {spans:#?}"))
+        };
+        let [request, shared, job] = ["POST /v1/jobs", "shared job", "job"].map(of);
+        assert_eq!((hex(&request.trace), hex(&request.parent)), (TRACE.to_owned(), CALLER.to_owned()));
+        assert_eq!((&shared.trace, &shared.parent), (&request.trace, &request.id));
+        assert_eq!((&job.trace, &job.parent), (&request.trace, &shared.id));
+    }
 }
 
 #[test]

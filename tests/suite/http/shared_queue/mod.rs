@@ -2,6 +2,7 @@
 
 mod faults;
 mod nats;
+mod service;
 mod starts;
 
 use std::process::Command;
@@ -27,17 +28,17 @@ fn command(queue: &str, store: &str, more: &[&str]) -> Command {
 }
 
 /// A service on a folder of this machine.
-struct Service {
+pub struct Service {
     nats: Nats,
     folder: tempfile::TempDir,
 }
 
 impl Service {
-    fn new() -> Option<Self> {
+    pub fn new() -> Option<Self> {
         Some(Self { nats: Nats::start()?, folder: tempfile::tempdir().unwrap() })
     }
 
-    fn command(&self, more: &[&str]) -> Command {
+    pub fn command(&self, more: &[&str]) -> Command {
         command(&self.nats.address(), &of_folder(self.folder.path()), more)
     }
 
@@ -52,7 +53,7 @@ impl Service {
 }
 
 /// Sends a job, and returns its address.
-fn job_of(answer: &Answer) -> String {
+pub fn job_of(answer: &Answer) -> String {
     assert_eq!(answer.status, 202, "{}", String::from_utf8_lossy(&answer.body));
     answer.header("location").unwrap().to_owned()
 }

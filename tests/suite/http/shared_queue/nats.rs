@@ -26,8 +26,9 @@ pub struct Nats {
 
 /// The versions that are tried: that of the system, and that of `target/python`.
 pub fn programs() -> Vec<PathBuf> {
+    let installed = [PathBuf::from("nats-server"), PathBuf::from("/usr/sbin/nats-server")].into_iter().find(runs);
     let later = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("target/python/bin/nats-server");
-    [PathBuf::from("nats-server"), PathBuf::from("/usr/sbin/nats-server"), later].into_iter().filter(runs).collect()
+    installed.into_iter().chain(Some(later).filter(runs)).collect()
 }
 
 fn runs(program: &PathBuf) -> bool {
@@ -90,6 +91,14 @@ impl Nats {
         let mut lines = stream.lines().map(Result::unwrap);
         let answer = lines.find(|line| line.starts_with('{')).unwrap();
         assert!(answer.contains("\"success\":true"), "{answer}");
+    }
+
+    /// Sends a message of this text.
+    pub fn publish(&self, subject: &str, text: &[u8]) {
+        let mut stream = BufReader::new(self.connect().unwrap());
+        let head = format!("CONNECT {{\"verbose\":false}}\r\nPUB {subject} {}\r\n", text.len());
+        stream.get_mut().write_all(&[head.as_bytes(), text, b"\r\nPING\r\n"].concat()).unwrap();
+        assert!(stream.lines().map(Result::unwrap).any(|line| line == "PONG"));
     }
 
     fn connect(&self) -> std::io::Result<TcpStream> {

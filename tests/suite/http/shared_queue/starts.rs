@@ -4,7 +4,8 @@ use std::process::Command;
 use std::time::Duration;
 
 use super::nats::Nats;
-use super::{Service, command};
+use super::{Service, command, job_of};
+use crate::http::jobs::durable::end_of;
 use crate::http::shared_store::bucket::Bucket;
 use crate::http::shared_store::{of_folder, wait};
 use crate::support::server::{CUBE_OBJ, Server, meshsnap};
@@ -39,7 +40,7 @@ fn wrong_settings_are_said_in_a_sentence() {
     assert!(many.status.code() == Some(2) && text.contains("or an address: nats://HOST:PORT/NAME"), "{text}");
 
     let Some(plain) = Nats::start_with(&[]) else { return };
-    usage(&mut command(&plain.address(), &store, &[]), &["shared queue", "cannot be set up"]);
+    usage(&mut command(&plain.address(), &store, &[]), &["shared queue", "cannot be used"]);
     let Some(locked) = Nats::start_with(&["-js", "--user", "a", "--pass", "b"]) else { return };
     usage(&mut command(&locked.address(), &store, &[]), &["refuses the credentials"]);
     let wrong = locked.address().replace("nats://", "nats://a:wrong@");
@@ -51,6 +52,25 @@ fn wrong_settings_are_said_in_a_sentence() {
     for (flag, text) in [("--queue-credentials-file", "/nonexistent/x"), ("--queue-ca", "/nonexistent/y")] {
         usage(&mut command(&right, &store, &[flag, text]), &[flag, text]);
     }
+}
+
+/// NATS with a certificate of an authority of one's own.
+#[test]
+fn a_queue_is_reached_by_tls() {
+    let tls = |name: &str| format!("{}/tests/data/tls/{name}", env!("CARGO_MANIFEST_DIR"));
+    let (certificate, key, ca) = (tls("server.pem"), tls("server.key"), tls("ca.pem"));
+    let Some(nats) = Nats::start_with(&["-js", "--tls", "--tlscert", &certificate, "--tlskey", &key]) else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let store = of_folder(folder.path());
+    let address = nats.address().replace("nats://", "tls://");
+    let server = Server::start_with(&mut command(&address, &store, &["--queue-ca", &ca]));
+    let job = job_of(&server.post("/v1/jobs?size=32", CUBE_OBJ));
+    assert_eq!(end_of(&server, &job)["state"], "done");
+    let output = meshsnap().args(["jobs", "--queue", &address, "--queue-ca", &ca]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = meshsnap().args(["jobs", "--queue", &address]).output().unwrap();
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(2) && text.contains("certificate"), "{text}");
 }
 
 #[test]

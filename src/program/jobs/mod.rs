@@ -1,4 +1,7 @@
-//! `meshsnap jobs`: lists the jobs that a server keeps in its data folder, also while the server runs.
+//! `meshsnap jobs`: lists the jobs that a server keeps in its data folder, also while the server runs; or those of a queue
+//! that several servers share, with its dead letters.
+
+mod queue;
 
 use std::fmt::Write as _;
 use std::io::ErrorKind;
@@ -7,17 +10,19 @@ use std::path::PathBuf;
 use clap::{Args, ValueHint};
 use serde::Serialize;
 
-use super::files;
 use crate::error::CliError;
+use crate::files;
 use meshsnap_server::config;
-use meshsnap_server::durable::{self, ErrorRecord, OpenError, RecoveredJob, RequestKind};
+use meshsnap_server::durable::{self, ErrorRecord, JobKey, OpenError, RecoveredJob, RequestKind};
 use meshsnap_server::jobs::{JobId, rfc_3339};
+use meshsnap_server::shared_queue::Note;
 
 /// Examples at the end of `--help`.
 pub const EXAMPLES: &str = "\
 Examples:
   meshsnap jobs
   meshsnap jobs --dead --data-dir /var/lib/meshsnap
+  meshsnap jobs --dead --queue nats://127.0.0.1:4222/farm
   meshsnap jobs --jsonl | jq -r .id";
 
 /// Arguments of `jobs`.
@@ -26,7 +31,16 @@ pub struct JobsArgs {
     /// Folder of the server [default: that of `serve` without a --config]
     #[arg(long, value_name = "DIR", env = "MESHSNAP_DATA_DIR", value_hint = ValueHint::DirPath)]
     data_dir: Option<PathBuf>,
-    /// Only jobs that have failed
+    /// Queue that several servers share, instead of a data folder: its jobs that have not ended
+    #[arg(long, value_name = "nats://HOST:PORT/NAME")]
+    queue: Option<String>,
+    /// File of credentials (.creds) for that queue
+    #[arg(long, value_name = "FILE", env = "MESHSNAP_QUEUE_CREDENTIALS_FILE", value_hint = ValueHint::FilePath)]
+    queue_credentials_file: Option<PathBuf>,
+    /// File of certificates in PEM by which the servers of that queue are trusted, beside the system's
+    #[arg(long, value_name = "FILE", env = "MESHSNAP_QUEUE_CA", value_hint = ValueHint::FilePath)]
+    queue_ca: Option<PathBuf>,
+    /// Only jobs that have failed; of a queue, those that were given up: its dead letters
     #[arg(long)]
     dead: bool,
     /// Print a line of JSON for each job
@@ -34,21 +48,26 @@ pub struct JobsArgs {
     jsonl: bool,
 }
 
-/// A job in a line of JSON. What the state of a job over HTTP has, too, has the same name there.
+/// A job in a line of JSON. Of a job in a queue that has not ended, less is known. What the state of a job over HTTP has, too, has the same name there.
 #[derive(Serialize)]
 struct JobLine<'a> {
     id: String,
     /// As over HTTP, but a job that was begun is `running`, also if its server has crashed.
     state: &'static str,
-    kind: RequestKind,
-    accepted_unix_ms: u64,
-    accepted_at: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    kind: Option<RequestKind>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    accepted_unix_ms: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    accepted_at: Option<String>,
     /// Times that a worker has begun it.
     starts: u32,
     owner: &'a str,
-    request_id: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    request_id: Option<&'a str>,
     /// The names of its mesh's files.
-    files: Vec<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    files: Option<Vec<&'a str>>,
     /// The stored mesh that it is about, by its SHA-256.
     #[serde(skip_serializing_if = "Option::is_none")]
     mesh: Option<String>,
@@ -75,6 +94,13 @@ struct ResultLine<'a> {
 
 /// Prints the jobs, the oldest first.
 pub fn run(arguments: &JobsArgs) -> Result<(), CliError> {
+    match &arguments.queue {
+        Some(address) => of_queue(address, arguments),
+        None => of_folder(arguments),
+    }
+}
+
+fn of_folder(arguments: &JobsArgs) -> Result<(), CliError> {
     let given = arguments.data_dir.clone().filter(|folder| !folder.as_os_str().is_empty());
     let folder = given.or_else(config::default_data_dir);
     let folder = folder.ok_or_else(|| CliError::usage("there is no home folder: say --data-dir DIR"))?;
@@ -93,18 +119,35 @@ pub fn run(arguments: &JobsArgs) -> Result<(), CliError> {
         error => CliError::usage(error.to_string()),
     })?;
     let jobs: Vec<JobLine> = contents.jobs.iter().map(JobLine::new).collect();
-    let shown = jobs.iter().filter(|job| !arguments.dead || job.state == FAILED);
+    let meshes = plural(contents.meshes.len(), "stored mesh", "stored meshes");
+    let summary = format!("{}, {meshes} in {}\n", summary(&jobs, "job", "jobs"), folder.display());
+    print(jobs.iter().filter(|job| !arguments.dead || job.state == FAILED), arguments.jsonl, &summary)
+}
+
+fn of_queue(address: &str, arguments: &JobsArgs) -> Result<(), CliError> {
+    let (found, address) = queue::find(address, arguments)?;
+    let (jobs, names): (Vec<JobLine>, _) = match &found {
+        queue::Found::Live(jobs) => {
+            (jobs.iter().map(|(key, note)| JobLine::of_note(*key, note.as_ref())).collect(), ("job", "jobs"))
+        }
+        queue::Found::Dead(jobs) => (jobs.iter().map(JobLine::new).collect(), ("dead letter", "dead letters")),
+    };
+    let summary = format!("{} in {address}\n", summary(&jobs, names.0, names.1));
+    print(jobs.iter(), arguments.jsonl, &summary)
+}
+
+fn print<'a>(jobs: impl Iterator<Item = &'a JobLine<'a>>, jsonl: bool, summary: &str) -> Result<(), CliError> {
     let mut text = String::new();
-    for job in shown {
-        if arguments.jsonl {
+    for job in jobs {
+        if jsonl {
             text += &serde_json::to_string(job).map_err(|error| CliError::ours(error.to_string()))?;
             text.push('\n');
         } else {
             job.print(&mut text);
         }
     }
-    if !arguments.jsonl {
-        text += &format!("{} in {}\n", summary(&jobs, contents.meshes.len()), folder.display());
+    if !jsonl {
+        text += summary;
     }
     files::print(text.as_bytes())
 }
@@ -131,13 +174,13 @@ impl<'a> JobLine<'a> {
         Self {
             id: JobId::from_key(record.key).to_string(),
             state: state_of(job),
-            kind: record.request.kind,
-            accepted_unix_ms: record.accepted_unix_ms,
-            accepted_at: rfc_3339(record.accepted_unix_ms),
+            kind: Some(record.request.kind),
+            accepted_unix_ms: Some(record.accepted_unix_ms),
+            accepted_at: Some(rfc_3339(record.accepted_unix_ms)),
             starts: job.starts,
             owner: &record.owner,
-            request_id: &record.request_id,
-            files: record.files.iter().map(|file| file.path.as_str()).collect(),
+            request_id: Some(&record.request_id),
+            files: Some(record.files.iter().map(|file| file.path.as_str()).collect()),
             mesh: record.mesh.map(|mesh| mesh.to_string()),
             ended_unix_ms: end.map(|end| end.at_unix_ms),
             fetched_unix_ms: end.and_then(|end| end.fetched_unix_ms),
@@ -151,13 +194,35 @@ impl<'a> JobLine<'a> {
         }
     }
 
+    /// A job of a queue, of which the note is what is known.
+    fn of_note(key: JobKey, note: Option<&'a Note>) -> Self {
+        Self {
+            id: JobId::from_key(key).to_string(),
+            state: if note.is_some_and(|note| note.is_running) { "running" } else { "queued" },
+            kind: None,
+            accepted_unix_ms: note.map(|note| note.accepted_unix_ms),
+            accepted_at: note.map(|note| rfc_3339(note.accepted_unix_ms)),
+            starts: note.map_or(0, |note| note.starts),
+            owner: note.map_or("", |note| &note.owner),
+            request_id: None,
+            files: None,
+            mesh: None,
+            ended_unix_ms: None,
+            fetched_unix_ms: None,
+            result: None,
+            error: None,
+        }
+    }
+
     fn print(&self, text: &mut String) {
         let kind = match self.kind {
-            RequestKind::Draw => "draw",
-            RequestKind::Check => "check",
-            RequestKind::Diff => "diff",
+            Some(RequestKind::Draw) => "draw",
+            Some(RequestKind::Check) => "check",
+            Some(RequestKind::Diff) => "diff",
+            None => "",
         };
-        let _ = write!(text, "{}  {:<9}  {}  {kind:<5}", self.id, self.state, self.accepted_at);
+        let accepted = self.accepted_at.as_deref().unwrap_or_default();
+        let _ = write!(text, "{}  {:<9}  {accepted:<24}  {kind:<5}", self.id, self.state);
         if let Some(error) = self.error {
             let _ = write!(text, "  {}: ", error.code);
             // Names from the client's file are in it.
@@ -173,12 +238,15 @@ impl<'a> JobLine<'a> {
     }
 }
 
-/// The start of the last line: numbers of jobs, by state, and of meshes.
-fn summary(jobs: &[JobLine], meshes: usize) -> String {
+/// The start of the last line: the number of jobs, by state.
+fn summary(jobs: &[JobLine], one: &str, many: &str) -> String {
     let count = |state| jobs.iter().filter(|job| job.state == state).count();
     let counts = STATES.iter().map(|state| (count(*state), state)).filter(|(count, _)| *count > 0);
     let counts: Vec<String> = counts.map(|(count, state)| format!("{count} {state}")).collect();
     let of_states = if counts.is_empty() { String::new() } else { format!(" ({})", counts.join(", ")) };
-    let plural = |count: usize, one: &str, many: &str| format!("{count} {}", if count == 1 { one } else { many });
-    format!("{}{of_states}, {}", plural(jobs.len(), "job", "jobs"), plural(meshes, "stored mesh", "stored meshes"))
+    format!("{}{of_states}", plural(jobs.len(), one, many))
+}
+
+fn plural(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }

@@ -1,7 +1,8 @@
-//! The stand-in for `nats.rs` in builds without the feature `cluster`: a queue that cannot be opened.
+//! The stand-in for `nats` in builds without the feature `cluster`: a queue that cannot be opened.
 
 use super::{AddressError, Kind, Note, OpenError, QueueError, QueueLoad, QueueSettings};
 use crate::durable::JobKey;
+use bytes::Bytes;
 use std::collections::HashSet;
 use std::convert::Infallible;
 use std::time::Duration;
@@ -15,9 +16,28 @@ pub struct Delivery(Infallible);
 /// No notes.
 pub struct Following(Infallible);
 
+/// No news.
+pub struct News(Infallible);
+
+/// Nothing is heard.
+pub enum Heard {
+    /// Never.
+    Told(Bytes),
+    /// Never.
+    Asked(Question),
+}
+
+/// No question.
+pub struct Question(Infallible);
+
 impl SharedQueue {
     /// An error: there is no NATS.
     pub async fn open(_: QueueSettings) -> Result<Self, OpenError> {
+        Err(AddressError::Absent.into())
+    }
+
+    /// An error: there is no NATS.
+    pub async fn open_made(_: QueueSettings) -> Result<Self, OpenError> {
         Err(AddressError::Absent.into())
     }
 
@@ -68,6 +88,38 @@ impl SharedQueue {
 
     /// Unreachable.
     pub async fn load(&self) -> Result<QueueLoad, QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn bury(&self, _: JobKey, _: Vec<u8>) -> Result<(), QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn dead(&self) -> Result<Vec<Bytes>, QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn tell(&self, _: Vec<u8>) -> Result<(), QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn hear(&self) -> Result<(News, Option<Bytes>), QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn answer(&self, question: Question, _: Vec<u8>) {
+        match question.0 {}
+    }
+}
+
+impl News {
+    /// Unreachable.
+    pub async fn next(&mut self) -> Option<Heard> {
         match self.0 {}
     }
 }

@@ -1,20 +1,29 @@
 //! The shared queue on NATS JetStream, through the crate async-nats.
 
+mod delivery;
+mod news;
+mod prepare;
+
+pub use delivery::{Delivery, Following};
+pub use news::{Heard, News, Question};
+
 use std::collections::HashSet;
 use std::time::{Duration, SystemTime};
 
-use async_nats::jetstream::consumer::{AckPolicy, PullConsumer, pull};
-use async_nats::jetstream::context::ContextBuilder;
+use async_nats::jetstream::Context;
+use async_nats::jetstream::consumer::PullConsumer;
+use async_nats::jetstream::context::GetStreamErrorKind;
 use async_nats::jetstream::kv::{self, CreateErrorKind, Operation, UpdateErrorKind};
 use async_nats::jetstream::message::PublishMessage;
-use async_nats::jetstream::stream::{self, DiscardPolicy, RetentionPolicy, Stream};
-use async_nats::jetstream::{AckKind, Context, Message};
-use async_nats::{Client, ConnectErrorKind, ConnectOptions, Event, Subscriber, connection};
-use futures_util::StreamExt as _;
+use async_nats::jetstream::stream::Stream;
+use async_nats::{Client, connection};
+use bytes::Bytes;
+use futures_util::{StreamExt as _, TryStreamExt as _};
 use serde::{Deserialize, Serialize};
 use tokio::sync::RwLock;
 
-use super::{ACK_WAIT, Kind, Note, OpenError, QueueError, QueueLoad, QueueSettings};
+use self::prepare::{Unprepared, connect, prepare};
+use super::{Kind, Note, OpenError, QueueError, QueueLoad, QueueSettings};
 use crate::durable::JobKey;
 
 /// The longest time for which an answer of NATS is waited for.
@@ -23,20 +32,8 @@ const ANSWER_TIME: Duration = Duration::from_secs(5);
 /// The longest time for which [`SharedQueue::take`] waits for a message.
 const TAKE_TIME: Duration = Duration::from_secs(2);
 
-/// The time within which a message that was sent under the same name is the same message.
-const DUPLICATE_TIME: Duration = Duration::from_secs(120);
-
 /// The longest time between two attempts to reach it at the start.
 const ATTEMPT_EVERY_MAX: Duration = Duration::from_secs(10);
-
-/// Messages that may be with daemons at a time: more than there are workers.
-const ON_WAY_MAX: i64 = 100_000;
-
-/// Daemons that may wait for messages at a time.
-const WAITING_MAX: i64 = 10_000;
-
-/// The name of the consumer that all daemons share.
-const CONSUMER: &str = "servers";
 
 /// The shared queue.
 pub struct SharedQueue {
@@ -50,24 +47,16 @@ pub struct SharedQueue {
 #[derive(Clone)]
 struct Handles {
     jobs: Place,
+    gpu_jobs: Place,
     webhooks: Place,
     notes: kv::Store,
+    dead: Stream,
 }
 
 #[derive(Clone)]
 struct Place {
     stream: Stream,
     consumer: PullConsumer,
-}
-
-/// A message that this daemon has.
-pub struct Delivery {
-    message: Message,
-}
-
-/// The notes on a job, as they change.
-pub struct Following {
-    notes: Subscriber,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -92,26 +81,40 @@ impl SharedQueue {
         }
     }
 
+    /// Opens a queue that servers have made, and makes nothing. Does not wait for a NATS that cannot be reached.
+    pub async fn open_made(settings: QueueSettings) -> Result<Self, OpenError> {
+        let address = settings.address.words();
+        let (client, context) = match connect(&settings).await? {
+            Ok(connected) => connected,
+            Err(cause) => return Err(OpenError::Unreachable { address, cause }),
+        };
+        if let Err(error) = context.get_stream(format!("{}-{}", settings.address.name, word_of(Kind::Job))).await {
+            let cause = match error.kind() {
+                GetStreamErrorKind::JetStream(error) if error.code() == 404 => {
+                    "there is no queue of this name".to_owned()
+                }
+                _ => words_of(&error),
+            };
+            return Err(OpenError::Setup { address, cause });
+        }
+        Self::with(client, context, settings).await?.map_err(|cause| OpenError::Unreachable { address, cause })
+    }
+
     /// The inner error is one that may pass.
     async fn try_open(settings: &QueueSettings) -> Result<Result<Self, String>, OpenError> {
-        let address = settings.address.words();
-        let options = options_of(settings).await?;
-        let client = match options.connect(settings.address.servers.as_slice()).await {
-            Ok(client) => client,
-            Err(error) => {
-                let cause = words_of(&error);
-                return match error.kind() {
-                    ConnectErrorKind::Authentication | ConnectErrorKind::AuthorizationViolation => {
-                        Err(OpenError::Refused { address, cause })
-                    }
-                    ConnectErrorKind::ServerParse => Err(OpenError::Setup { address, cause }),
-                    _ => Ok(Err(cause)),
-                };
-            }
-        };
-        let context = ContextBuilder::new().timeout(ANSWER_TIME).ack_timeout(ANSWER_TIME).build(client.clone());
-        match prepare(&context, settings).await {
-            Ok(handles) => Ok(Ok(Self { client, context, settings: settings.clone(), handles: RwLock::new(handles) })),
+        match connect(settings).await? {
+            Ok((client, context)) => Self::with(client, context, settings.clone()).await,
+            Err(cause) => Ok(Err(cause)),
+        }
+    }
+
+    async fn with(
+        client: Client,
+        context: Context,
+        settings: QueueSettings,
+    ) -> Result<Result<Self, String>, OpenError> {
+        match prepare(&context, &settings).await {
+            Ok(handles) => Ok(Ok(Self { client, context, settings, handles: RwLock::new(handles) })),
             Err(Unprepared::ForNow(cause)) => Ok(Err(cause)),
             Err(Unprepared::ForGood(error)) => Err(error),
         }
@@ -144,7 +147,7 @@ impl SharedQueue {
     }
 
     /// Waits for a message, no longer than some seconds. Dropped before its end, it may leave a message to nobody until
-    /// [`ACK_WAIT`] has passed.
+    /// [`ACK_WAIT`](crate::shared_queue::ACK_WAIT) has passed.
     pub async fn take(&self, kind: Kind) -> Result<Option<Delivery>, QueueError> {
         self.check_connection()?;
         let consumer = self.place(kind).await.consumer;
@@ -166,19 +169,13 @@ impl SharedQueue {
     pub async fn live(&self, kind: Kind) -> Result<HashSet<JobKey>, QueueError> {
         self.check_connection()?;
         let stream = self.place(kind).await.stream;
-        let mut subjects = match stream.info_with_subjects(self.subjects(kind)).await {
-            Ok(subjects) => subjects,
+        match self.subjects_in(&stream, &format!("{}.{}.*", self.settings.address.name, word_of(kind))).await {
+            Ok(subjects) => Ok(subjects.iter().filter_map(|subject| key_of(subject)).collect()),
             Err(error) => {
                 self.prepare_again().await?;
-                return Err(self.unavailable(&error));
+                Err(error)
             }
-        };
-        let mut live = HashSet::new();
-        while let Some(subject) = subjects.next().await {
-            let (subject, _) = subject.map_err(|error| self.unavailable(&error))?;
-            live.extend(key_of(&subject));
         }
-        Ok(live)
     }
 
     /// The note on a job, and its age.
@@ -245,26 +242,72 @@ impl SharedQueue {
     /// The load of the queue.
     pub async fn load(&self) -> Result<QueueLoad, QueueError> {
         self.check_connection()?;
-        let Handles { jobs, webhooks, .. } = self.handles.read().await.clone();
-        let of_jobs = jobs.stream.get_info().await.map_err(|error| self.unavailable(&error))?;
-        let of_webhooks = webhooks.stream.get_info().await.map_err(|error| self.unavailable(&error))?;
-        let consumer = jobs.consumer.get_info().await.map_err(|error| self.unavailable(&error))?;
-        let oldest = match of_jobs.state.messages {
-            0 => 0,
-            _ => seconds_since(of_jobs.state.first_timestamp.unix_timestamp()),
+        let mut load = QueueLoad::default();
+        for kind in Kind::ALL {
+            let Place { stream, consumer } = self.place(kind).await;
+            let state = stream.get_info().await.map_err(|error| self.unavailable(&error))?.state;
+            *match kind {
+                Kind::Job => &mut load.jobs,
+                Kind::GpuJob => &mut load.gpu_jobs,
+                Kind::Webhook => &mut load.webhooks,
+            } = state.messages;
+            if kind == Kind::Webhook {
+                continue;
+            }
+            let consumer = consumer.get_info().await.map_err(|error| self.unavailable(&error))?;
+            load.redelivered += consumer.num_redelivered as u64;
+            if state.messages > 0 {
+                let age = Duration::from_secs(seconds_since(state.first_timestamp.unix_timestamp()));
+                load.oldest = load.oldest.max(age);
+            }
+        }
+        load.dead =
+            self.dead_letters().await.get_info().await.map_err(|error| self.unavailable(&error))?.state.messages;
+        Ok(load)
+    }
+
+    /// Keeps a job that was given up, with the reason, for people to look at.
+    pub async fn bury(&self, key: JobKey, letter: Vec<u8>) -> Result<(), QueueError> {
+        self.check_connection()?;
+        let subject = format!("{}.dead.{}", self.settings.address.name, name_of(key));
+        let sent = match self.context.publish(subject, letter.into()).await {
+            Ok(sent) => sent.await,
+            Err(error) => Err(error),
         };
-        Ok(QueueLoad {
-            jobs: of_jobs.state.messages,
-            webhooks: of_webhooks.state.messages,
-            redelivered: consumer.num_redelivered as u64,
-            oldest: Duration::from_secs(oldest),
-        })
+        sent.map(drop).map_err(|error| self.unavailable(&error))
+    }
+
+    /// The jobs that were given up, in the order of their names, which is that of their acceptance.
+    pub async fn dead(&self) -> Result<Vec<Bytes>, QueueError> {
+        let (stream, mut letters) = (self.dead_letters().await, Vec::new());
+        let mut subjects = self.subjects_in(&stream, &format!("{}.dead.*", self.settings.address.name)).await?;
+        subjects.sort();
+        for subject in subjects {
+            // One that has become too old meanwhile is left out.
+            if let Ok(letter) = stream.get_last_raw_message_by_subject(&subject).await {
+                letters.push(letter.payload);
+            }
+        }
+        Ok(letters)
+    }
+
+    async fn dead_letters(&self) -> Stream {
+        self.handles.read().await.dead.clone()
+    }
+
+    async fn subjects_in(&self, stream: &Stream, filter: &str) -> Result<Vec<String>, QueueError> {
+        let found = stream.info_with_subjects(filter).await.map_err(|error| self.unavailable(&error))?;
+        found
+            .map(|subject| subject.map(|(subject, _)| subject).map_err(|error| self.unavailable(&error)))
+            .try_collect()
+            .await
     }
 
     async fn place(&self, kind: Kind) -> Place {
         let handles = self.handles.read().await;
         match kind {
             Kind::Job => handles.jobs.clone(),
+            Kind::GpuJob => handles.gpu_jobs.clone(),
             Kind::Webhook => handles.webhooks.clone(),
         }
     }
@@ -293,10 +336,6 @@ impl SharedQueue {
         format!("{}.{}.{}", self.settings.address.name, word_of(kind), name_of(key))
     }
 
-    fn subjects(&self, kind: Kind) -> String {
-        format!("{}.{}.*", self.settings.address.name, word_of(kind))
-    }
-
     fn unavailable(&self, error: &(dyn std::error::Error + 'static)) -> QueueError {
         self.error(words_of(error))
     }
@@ -306,162 +345,10 @@ impl SharedQueue {
     }
 }
 
-impl Following {
-    /// The next note. None if there will be no more.
-    pub async fn next(&mut self) -> Option<Note> {
-        loop {
-            let message = self.notes.next().await?;
-            // What is no note is the end of one.
-            if let Ok(note) = serde_json::from_slice(&message.payload) {
-                return Some(note);
-            }
-        }
-    }
-}
-
-impl Delivery {
-    /// The job that it is about. None if the message was sent by somebody else.
-    pub fn key(&self) -> Option<JobKey> {
-        key_of(&self.message.subject)
-    }
-
-    /// Keeps the message for longer.
-    pub async fn sign_of_life(&self) {
-        let _ = tokio::time::timeout(ANSWER_TIME, self.message.ack_with(AckKind::Progress)).await;
-    }
-
-    /// Lets another daemon have it, after a while.
-    pub async fn give_back(&self, after: Duration) {
-        let _ = tokio::time::timeout(ANSWER_TIME, self.message.ack_with(AckKind::Nak(Some(after)))).await;
-    }
-
-    /// Ends the message. Returns once JetStream has said that it has. If it does not, the message comes again.
-    pub async fn end(&self) {
-        if let Ok(Err(error)) = tokio::time::timeout(ANSWER_TIME, self.message.double_ack()).await {
-            tracing::info!(%error, "a message of the shared queue may come again");
-        }
-    }
-}
-
-enum Unprepared {
-    ForNow(String),
-    ForGood(OpenError),
-}
-
-async fn options_of(settings: &QueueSettings) -> Result<ConnectOptions, OpenError> {
-    let mut options = ConnectOptions::new()
-        .name("meshsnap")
-        .connection_timeout(ANSWER_TIME)
-        .request_timeout(Some(ANSWER_TIME))
-        .ping_interval(Duration::from_secs(5))
-        .event_callback(|event| async move {
-            match event {
-                Event::Connected => tracing::info!("connected to the shared queue"),
-                Event::Disconnected => tracing::error!("the shared queue cannot be reached"),
-                other => tracing::warn!(event = %other, "the shared queue"),
-            }
-        });
-    if let Some((user, password)) = settings.address.login.clone() {
-        options = options.user_and_password(user, password);
-    }
-    if let Some(path) = &settings.credentials {
-        let error = |cause: std::io::Error| OpenError::File {
-            setting: "--queue-credentials-file",
-            cause: format!("{}: {cause}", path.display()),
-        };
-        options = options.credentials_file(path).await.map_err(error)?;
-    }
-    if let Some(path) = &settings.ca {
-        let error = |cause: std::io::Error| OpenError::File {
-            setting: "--queue-ca",
-            cause: format!("{}: {cause}", path.display()),
-        };
-        tokio::fs::metadata(path).await.map_err(error)?;
-        options = options.add_root_certificates(path.clone());
-    }
-    Ok(options)
-}
-
-/// Finds or makes what JetStream has of the queue.
-async fn prepare(context: &Context, settings: &QueueSettings) -> Result<Handles, Unprepared> {
-    let jobs = place_of(context, settings, Kind::Job).await?;
-    let webhooks = place_of(context, settings, Kind::Webhook).await?;
-    let bucket = &settings.address.name;
-    // A bucket is a stream of this form. The crate's own call would ask for the account's reservations, of which NATS 2.9
-    // says nothing.
-    let config = stream::Config {
-        name: format!("KV_{bucket}"),
-        description: Some("What servers of meshsnap know of their jobs".to_owned()),
-        subjects: vec![format!("$KV.{bucket}.>")],
-        max_messages_per_subject: 1,
-        max_age: settings.note_time,
-        discard: DiscardPolicy::New,
-        allow_rollup: true,
-        deny_delete: true,
-        allow_direct: true,
-        ..stream::Config::default()
-    };
-    context.get_or_create_stream(config).await.map_err(|error| unprepared(settings, &error))?;
-    let notes = context.get_key_value(bucket).await.map_err(|error| unprepared(settings, &error))?;
-    Ok(Handles { jobs, webhooks, notes })
-}
-
-async fn place_of(context: &Context, settings: &QueueSettings, kind: Kind) -> Result<Place, Unprepared> {
-    let (name, word) = (&settings.address.name, word_of(kind));
-    let wanted = stream::Config {
-        name: format!("{name}-{word}"),
-        description: Some(format!("The {word} of servers of meshsnap")),
-        subjects: vec![format!("{name}.{word}.*")],
-        retention: RetentionPolicy::WorkQueue,
-        discard: DiscardPolicy::New,
-        max_messages: i64::try_from(settings.jobs_max).unwrap_or(i64::MAX),
-        duplicate_window: DUPLICATE_TIME,
-        ..stream::Config::default()
-    };
-    let made = context.get_or_create_stream(wanted.clone()).await;
-    let mut stream = made.map_err(|error| unprepared(settings, &error))?;
-    let found = stream.info().await.map_err(|error| unprepared(settings, &error))?.config.clone();
-    let texts = |config: &stream::Config| {
-        [
-            ("retention", format!("{:?}", config.retention)),
-            ("discard policy", format!("{:?}", config.discard)),
-            ("subjects", config.subjects.join(" ")),
-            ("max_msgs", config.max_messages.to_string()),
-        ]
-    };
-    for ((what, found), (_, needed)) in texts(&found).into_iter().zip(texts(&wanted)) {
-        if found != needed {
-            let (address, name) = (settings.address.words(), wanted.name);
-            return Err(Unprepared::ForGood(OpenError::Other { address, name, what, found, needed }));
-        }
-    }
-    let config = pull::Config {
-        durable_name: Some(CONSUMER.to_owned()),
-        ack_policy: AckPolicy::Explicit,
-        ack_wait: ACK_WAIT,
-        max_deliver: -1,
-        max_ack_pending: ON_WAY_MAX,
-        max_waiting: WAITING_MAX,
-        ..pull::Config::default()
-    };
-    let consumer =
-        stream.get_or_create_consumer(CONSUMER, config).await.map_err(|error| unprepared(settings, &error))?;
-    Ok(Place { stream, consumer })
-}
-
-/// An answer of JetStream that says no is for good; none at all, or one of a server that only starts, may pass.
-fn unprepared(settings: &QueueSettings, error: &(dyn std::error::Error + 'static)) -> Unprepared {
-    let cause = words_of(error);
-    let may_pass = ["timed out", "not available", "temporarily unavailable", "no suitable peers", "offline"];
-    if may_pass.iter().any(|words| cause.contains(words)) {
-        return Unprepared::ForNow(cause);
-    }
-    Unprepared::ForGood(OpenError::Setup { address: settings.address.words(), cause })
-}
-
 fn word_of(kind: Kind) -> &'static str {
     match kind {
         Kind::Job => "jobs",
+        Kind::GpuJob => "gpu-jobs",
         Kind::Webhook => "webhooks",
     }
 }
