@@ -18,6 +18,9 @@ const DAY_S: f64 = 24.0 * 3600.0;
 /// Requests after which parties are forgotten that have asked for little: their memory is all that they cost.
 const FORGET_EVERY: u64 = 4096;
 
+/// Parties of which the other servers are told at a time, at most.
+const UNTOLD_MAX: usize = 100_000;
+
 /// The error of a party that asks for too much.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TooMuch {
@@ -100,9 +103,7 @@ impl Rates {
         if self.rate.is_none() && self.day.is_none() {
             return Ok(());
         }
-        if self.checks.fetch_add(1, Ordering::Relaxed) % FORGET_EVERY == FORGET_EVERY - 1 {
-            self.forget();
-        }
+        self.forget_now_and_then();
         let mut all = lock(&self.used);
         let used = self.used_now(&mut all, party);
         let wait = |limit: &Limit, used: f64| {
@@ -124,16 +125,14 @@ impl Rates {
         drop(all);
         if let Some(untold) = &self.untold {
             let mut untold = lock(untold);
-            let spent = untold.entry(party.clone()).or_default();
-            spent.requests = spent.requests.saturating_add(1);
-            spent.works = spent.works.saturating_add(u32::from(is_work));
+            // While the others cannot be told, as many clients are enough.
+            if untold.len() < UNTOLD_MAX || untold.contains_key(party) {
+                let spent = untold.entry(party.clone()).or_default();
+                spent.requests = spent.requests.saturating_add(1);
+                spent.works = spent.works.saturating_add(u32::from(is_work));
+            }
         }
         Ok(())
-    }
-
-    /// True if something is limited, and other servers are to be told.
-    pub fn is_shared(&self) -> bool {
-        self.untold.is_some()
     }
 
     /// What was admitted since the last call.
@@ -141,33 +140,56 @@ impl Rates {
         self.untold.as_ref().map_or_else(Vec::new, |untold| std::mem::take(&mut *lock(untold)).into_iter().collect())
     }
 
+    /// The others cannot be told at this moment. What counts for a second is over when they can be.
+    pub fn hold_spent(&self) {
+        if let Some(untold) = &self.untold {
+            lock(untold).retain(|_, spent| {
+                spent.requests = 0;
+                spent.works > 0
+            });
+        }
+    }
+
     /// Counts what another server has admitted.
     pub fn add(&self, party: &Owner, spent: Spent) {
+        self.forget_now_and_then();
         let mut all = lock(&self.used);
         let used = self.used_now(&mut all, party);
         used.rate += f64::from(spent.requests);
         used.day += f64::from(spent.works);
     }
 
-    /// What each party has used of its share of the day, the largest first; at most `most` of them.
+    /// What each party has used of its share of the day, but for what the others will be told of; at most `most` parties,
+    /// those that have used the most.
     pub fn of_day(&self, most: usize) -> Vec<(Owner, f64)> {
         let Some(limit) = &self.day else { return Vec::new() };
         let now = Instant::now();
-        let all = lock(&self.used);
-        let used = all.iter().map(|(party, used)| (party.clone(), limit.left(used.day, now, used.at)));
-        let mut used: Vec<_> = used.filter(|(_, used)| *used > 0.0).collect();
-        used.sort_by(|(_, a), (_, b)| b.total_cmp(a));
-        used.truncate(most);
+        let untold: HashMap<Owner, u32> = match &self.untold {
+            Some(untold) => lock(untold).iter().map(|(party, spent)| (party.clone(), spent.works)).collect(),
+            None => HashMap::new(),
+        };
+        let all = lock(&self.used).iter().map(|(party, used)| (party.clone(), *used)).collect::<Vec<_>>();
+        let told = |(party, used): (Owner, Used)| {
+            let untold = untold.get(&party).map_or(0.0, |works| f64::from(*works));
+            (party, limit.left(used.day, now, used.at) - untold)
+        };
+        let mut used: Vec<_> = all.into_iter().map(told).filter(|(_, used)| *used > 0.0).collect();
+        if used.len() > most {
+            used.select_nth_unstable_by(most, |(_, a), (_, b)| b.total_cmp(a));
+            used.truncate(most);
+        }
         used
     }
 
-    /// Parties have used at least this of their share of the day, at a time `age` ago.
-    pub fn learn_of_day(&self, parties: impl Iterator<Item = (Owner, f64)>, age: Duration) {
-        let Some(limit) = self.day else { return };
+    /// Parties have used at least this of their share of the day.
+    pub fn learn_of_day(&self, parties: impl Iterator<Item = (Owner, f64)>) {
+        if self.day.is_none() {
+            return;
+        }
         let mut all = lock(&self.used);
         for (party, known) in parties {
             let used = self.used_now(&mut all, &party);
-            used.day = used.day.max(known.min(f64::from(u32::MAX)) - limit.per_s * age.as_secs_f64());
+            used.day = used.day.max(known.min(f64::from(u32::MAX)));
         }
     }
 
@@ -180,7 +202,10 @@ impl Rates {
         used
     }
 
-    fn forget(&self) {
+    fn forget_now_and_then(&self) {
+        if self.checks.fetch_add(1, Ordering::Relaxed) % FORGET_EVERY != FORGET_EVERY - 1 {
+            return;
+        }
         let now = Instant::now();
         let is_used =
             |limit: &Option<Limit>, amount: f64, at| limit.is_some_and(|limit| limit.left(amount, now, at) > 0.0);
@@ -224,7 +249,7 @@ mod tests {
         days.check(&two, true).unwrap();
         let none = Rates::new(0, 5, 0, true);
         assert!((0..1000).all(|_| none.check(&one, true).is_ok()));
-        assert!(!none.is_shared() && none.take_spent().is_empty());
+        assert!(none.take_spent().is_empty());
     }
 
     #[test]
@@ -234,8 +259,9 @@ mod tests {
             rates.check(&Owner::new(&number.to_string()), true).unwrap();
         }
         std::thread::sleep(Duration::from_millis(20));
+        // Those that other servers tell of are forgotten, too.
         for _ in 0..FORGET_EVERY {
-            let _ = rates.check(&Owner::new("last"), true);
+            rates.add(&Owner::new("last"), Spent { requests: 1, works: 1 });
         }
         let count = lock(&rates.used).len();
         assert!(count <= 1, "{count}");
@@ -265,11 +291,30 @@ mod tests {
 
         // A server that starts later learns of it.
         let late = Rates::new(0, 0, 100, true);
-        late.learn_of_day(servers[1].of_day(10).into_iter(), Duration::from_secs(864));
+        late.learn_of_day(servers[1].of_day(10).into_iter());
         let error = late.check(&party, true).unwrap_err();
-        assert!((error.retry_after_s() as f64 - (waits_s - 864.0)).abs() < 10.0, "{error}");
-        late.learn_of_day([(party.clone(), 1.0)].into_iter(), Duration::ZERO);
+        assert!((error.retry_after_s() as f64 - waits_s).abs() < 10.0, "{error}");
+        late.learn_of_day([(party.clone(), 1.0)].into_iter());
         assert!(late.check(&party, true).is_err(), "less is no news");
         late.check(&Owner::new("two"), true).unwrap();
+        // It will tell of this one, and so does not answer with it.
+        let used = late.of_day(10);
+        assert_eq!(used.iter().map(|(party, _)| party.to_string()).collect::<Vec<_>>(), ["one"]);
+        assert_eq!((late.of_day(0).len(), servers[0].of_day(10).len()), (0, 1));
+    }
+
+    /// Requests of an outage are no debt of the seconds after it.
+    #[test]
+    fn what_could_not_be_told_in_its_second_is_not_told() {
+        let [a, b] = [(); 2].map(|()| Rates::new(1000, 1000, 1000, true));
+        let party = Owner::new("one");
+        (0..10).for_each(|i| a.check(&party, i < 3).unwrap());
+        a.check(&Owner::new("two"), false).unwrap();
+        a.hold_spent();
+        a.check(&party, true).unwrap();
+        let told = a.take_spent();
+        assert_eq!(told, [(party.clone(), Spent { requests: 1, works: 4 })]);
+        b.add(&party, told[0].1);
+        assert_eq!(b.of_day(10).len(), 1);
     }
 }

@@ -488,12 +488,14 @@ def model(options):
           f"{writes:.2f} writes and {reads:.2f} reads of the store: {operations}")
 
     print(f"with {SERVER_JOBS} jobs a second of each server:")
-    print("servers  jobs/s   NATS: messages/s    MB/s  cores   store: writes/s  reads/s  prefixes needed")
+    print("servers  jobs/s   NATS: messages/s    MB/s  cores  news/s   store: writes/s  reads/s  prefixes needed")
     for number in (10, 100, 1000):
         rate = number * SERVER_JOBS
         values = [number * own + rate * each for own, each in zip(per_server, (messages, size, cpu))]
         prefixes = max(rate * writes / S3_WRITES, rate * reads / S3_READS)
-        print(f"{number:7} {rate:7} {values[0]:18.0f} {values[1] / 1e6:7.1f} {values[2]:6.1f} {rate * writes:17.0f} {rate * reads:8.0f} {prefixes:16.1f}")
+        # Every server hears every other one: that it is there, and what it has admitted, as `shared_jobs/news.rs` says.
+        news = number * number * (.1 / max(1, number // 100) + 5 / max(1, number // 20))
+        print(f"{number:7} {rate:7} {values[0]:18.0f} {values[1] / 1e6:7.1f} {values[2]:6.1f} {news:7.0f} {rate * writes:17.0f} {rate * reads:8.0f} {prefixes:16.1f}")
     return True
 
 

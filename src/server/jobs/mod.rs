@@ -161,7 +161,7 @@ pub enum Refusal {
     /// The mesh keeps workers busy beyond the time of a job.
     #[error(
         "the mesh {mesh}, or comparisons with it, kept workers busy long after their time was up, so that is not tried \
-         again until the server starts anew"
+         again until the service starts anew"
     )]
     Quarantined {
         /// Its SHA-256.

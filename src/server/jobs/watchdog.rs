@@ -152,10 +152,12 @@ impl Quarantine {
         let last = Instant::now();
         let none = Strikes { alone: 0, compared: 0, ..with };
         let entry = meshes.entry(with.mesh).or_insert(Entry { strikes: none, last });
-        entry.last = last;
-        entry.strikes.alone = both(entry.strikes.alone, with.alone);
-        entry.strikes.compared = both(entry.strikes.compared, with.compared);
-        entry.strikes
+        let (alone, compared) = (both(entry.strikes.alone, with.alone), both(entry.strikes.compared, with.compared));
+        let strikes = Strikes { alone, compared, ..entry.strikes };
+        if strikes != entry.strikes {
+            *entry = Entry { strikes, last };
+        }
+        strikes
     }
 
     /// The strikes by this server's workers since the last call.
@@ -163,9 +165,19 @@ impl Quarantine {
         std::mem::take(&mut *lock(&self.untold))
     }
 
-    /// The strikes of all meshes.
-    pub fn all(&self) -> Vec<Strikes> {
-        lock(&self.meshes).values().map(|entry| entry.strikes).collect()
+    /// The strikes of all meshes, but for those of which the other servers will be told.
+    pub fn told(&self) -> Vec<Strikes> {
+        let untold = lock(&self.untold);
+        let meshes = lock(&self.meshes);
+        let told = meshes.values().map(|Entry { strikes, .. }| {
+            let same = untold.iter().filter(|untold| untold.mesh == strikes.mesh);
+            same.fold(*strikes, |told, untold| Strikes {
+                alone: told.alone.saturating_sub(untold.alone),
+                compared: told.compared.saturating_sub(untold.compared),
+                ..told
+            })
+        });
+        told.filter(|strikes| strikes.alone + strikes.compared > 0).collect()
     }
 
     /// The digest of a mesh of a job that is refused.
@@ -247,15 +259,17 @@ mod tests {
             assert_eq!(b.add(strikes).alone, 1);
         }
         assert_eq!((b.strike(&evil)[0].1, b.count()), (2, 1), "the second one of both");
+        // One that asks in this moment, and asks again, counts each once, although it also hears of them.
         for _ in 0..2 {
-            b.all().into_iter().for_each(|strikes| c.learn(strikes));
+            b.told().into_iter().for_each(|strikes| c.learn(strikes));
         }
-        assert_eq!(c.holds(&evil), Some(Digest::of(b"evil")));
-        assert_eq!((c.all(), c.take_untold()), (b.all(), Vec::new()), "what is learnt twice counts once");
-        assert_eq!(a.count(), 0, "it was not told");
+        assert_eq!((c.told()[0].alone, c.holds(&evil), a.count()), (1, None, 0));
         for strikes in b.take_untold() {
             a.add(strikes);
+            c.add(strikes);
         }
-        assert_eq!((a.count(), a.all()), (1, b.all()));
+        b.told().into_iter().for_each(|strikes| c.learn(strikes));
+        assert_eq!((c.holds(&evil), c.take_untold()), (Some(Digest::of(b"evil")), Vec::new()));
+        assert_eq!((a.count(), a.told(), c.told()), (1, b.told(), b.told()));
     }
 }

@@ -101,8 +101,8 @@ impl Key {
     /// A key of the setting: it may do everything but see what is others'.
     fn unnamed(key: &str) -> (Digest, Self) {
         let digest = Digest::of(key.as_bytes());
-        // The digest stands for the key wherever the owner's name is stored.
-        let owner = Owner::new(&format!("key {digest}"));
+        // The owner's name is stored and listed in many places, and the digest signs addresses: another one stands for the key.
+        let owner = Owner::new(&format!("key {}", Digest::of(format!("owner {digest}").as_bytes())));
         let scopes = vec![Scope::Render, Scope::Store, Scope::Metrics];
         (digest, Self { name: String::new(), owner, signs_with: digest.to_string(), scopes })
     }
@@ -262,5 +262,13 @@ mod tests {
         assert!(access(&[Scope::Render]).sees(&owner) && !access(&[Scope::Render, Scope::Metrics]).sees(&two));
         assert!(access(&[Scope::Admin]).sees(&two) && Access::open(one).sees(&two));
         assert!(!Access::default().sees(&two));
+    }
+
+    #[test]
+    fn the_name_of_an_owner_signs_nothing() {
+        let (digest, key) = Key::unnamed("secret");
+        assert_eq!(key.signs_with, digest.to_string());
+        assert!(!key.owner.to_string().contains(&key.signs_with));
+        assert_ne!(key.owner, Key::unnamed("other").1.owner);
     }
 }

@@ -7,7 +7,7 @@
 //! - The stream `NAME-jobs`, a work queue: a message for each job that has not ended, under a subject of the job's own. A
 //!   daemon takes a message, and acknowledges it when the job's end is stored. Without that, or a sign of life
 //!   within [`ACK_WAIT`], another daemon gets it.
-//! - The stream `NAME-gpu-jobs`, the same for jobs that ask for a GPU.
+//! - The stream `NAME-gpu`, the same for jobs that ask for a GPU.
 //! - The stream `NAME-webhooks`, the same for the ends that a webhook is to be told of.
 //! - The key-value bucket `NAME`: a [`Note`] for each job, and the leases by which one daemon at a time does something.
 //! - The stream `NAME-dead`: jobs that were given up, with the reason, for people to look at.
@@ -21,7 +21,7 @@ mod address;
 mod nats;
 
 pub use address::{Address, AddressError};
-pub use nats::{Delivery, Following, Heard, News, Question, SharedQueue};
+pub use nats::{Delivery, Following, Heard, News, Question, SharedQueue, list_dead, list_live};
 
 use std::path::PathBuf;
 use std::time::Duration;

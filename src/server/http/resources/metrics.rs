@@ -25,7 +25,7 @@ pub async fn get(State(state): State<Arc<AppState>>) -> Result<Response, ApiErro
     {
         gauges.shared_queue = vec![
             ("jobs", load.jobs),
-            ("gpu-jobs", load.gpu_jobs),
+            ("gpu", load.gpu_jobs),
             ("webhooks", load.webhooks),
             ("redelivered", load.redelivered),
             ("dead", load.dead),

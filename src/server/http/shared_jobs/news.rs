@@ -15,13 +15,17 @@ use crate::digest::Digest;
 use crate::http::state::AppState;
 use crate::jobs::{Owner, Strikes};
 use crate::rates::Spent;
-use crate::shared_queue::{Heard, News};
+use crate::shared_queue::{Heard, News, Question};
 
-/// Time between two messages of a daemon that has something to tell, of few daemons. Of more than [`FEW_TELLERS`] it is
-/// as many times longer, because each of them hears all.
+/// Time between two messages of a daemon that has something to tell, where there are few daemons. Where there are more than
+/// [`FEW_TELLERS`], it is as many times longer, because each of them hears all.
 const TELL_EVERY: Duration = Duration::from_millis(200);
 
+/// The number of daemons that are few.
 const FEW_TELLERS: u32 = 20;
+
+/// Characters of the name of a daemon: those of a UUID.
+const NAME_CHARS: usize = 36;
 
 /// Time after which another daemon is asked again what it knows.
 const ASK_EVERY: Duration = Duration::from_secs(60);
@@ -32,18 +36,24 @@ const TOLD_MAX: usize = 2000;
 /// Pause after a failure of the queue.
 const PAUSE: Duration = Duration::from_secs(1);
 
-/// A message to all.
-#[derive(Default, Serialize, Deserialize)]
-#[serde(default)]
+/// A message to all. One of a later version may have more, and one of an earlier version less.
+#[derive(Serialize, Deserialize)]
 struct Told {
     /// The name of the daemon.
     server: String,
     /// It has a GPU, or has not tried to draw with one.
+    #[serde(default = "yes")]
     has_gpu: bool,
     /// Clients, with the requests and the works that were admitted since the last message.
+    #[serde(default)]
     spent: Vec<(String, u32, u32)>,
     /// Meshes that have kept workers busy since the last message.
+    #[serde(default)]
     strikes: Vec<Struck>,
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// An answer to a daemon that asks.
@@ -70,8 +80,8 @@ pub async fn tell(shared: Arc<SharedJobs>, state: Arc<AppState>) {
     loop {
         let count = shared.others.count();
         tokio::time::sleep(TELL_EVERY * (count / FEW_TELLERS).max(1)).await;
-        // What is to be told is kept until somebody may hear it.
         if !shared.queue.is_connected() {
+            state.rates.hold_spent();
             continue;
         }
         let (spent, strikes) = (state.rates.take_spent(), state.jobs.quarantine().take_untold());
@@ -100,40 +110,100 @@ pub async fn tell(shared: Arc<SharedJobs>, state: Arc<AppState>) {
 /// Hears the others until the process ends. `news` is what was heard at the start.
 pub async fn hear(shared: Arc<SharedJobs>, state: Arc<AppState>, mut news: Option<News>) {
     loop {
-        if let Some(news) = &mut news {
-            // What was missed while NATS was away is learnt with the next question.
-            let _ = tokio::time::timeout(ASK_EVERY, shared.hear_of(&state, news)).await;
-        } else {
-            tokio::time::sleep(PAUSE).await;
+        match &mut news {
+            Some(news) => shared.hear_of(&state, news).await,
+            None => tokio::time::sleep(PAUSE).await,
         }
         news = shared.begin_to_hear(&state).await;
     }
 }
 
 impl SharedJobs {
-    /// Asks another daemon what it knows, and hears all from now on. None if the queue cannot be reached.
+    /// Hears all from now on, and learns what another daemon knows. None if the queue cannot be reached.
     pub(super) async fn begin_to_hear(&self, state: &AppState) -> Option<News> {
-        let (news, known) = self.queue.hear().await.ok()?;
-        if let Some(known) = known.and_then(|bytes| serde_json::from_slice(&bytes).ok()) {
-            learn(state, known);
+        let mut news = self.queue.hear().await.ok()?;
+        // It does not hear questions yet, and so not its own.
+        if let Some(known) = self.queue.ask(&self.server).await {
+            self.learn(state, &mut news, &known);
         }
+        self.queue.hear_questions(&mut news).await.ok()?;
         self.others.listens();
         Some(news)
     }
 
     async fn hear_of(&self, state: &AppState, news: &mut News) {
-        while let Some(heard) = news.next().await {
-            match heard {
-                Heard::Told(bytes) => {
-                    if let Ok(told) = serde_json::from_slice::<Told>(&bytes)
-                        && told.server != self.server
-                    {
-                        self.others.heard(&told.server, told.has_gpu);
-                        take_over(state, told);
-                    }
+        loop {
+            // What is missed while NATS is away is learnt with the next question.
+            let until = tokio::time::sleep(ASK_EVERY);
+            tokio::pin!(until);
+            while let Some(heard) = tokio::select! {
+                heard = news.next() => Some(heard),
+                () = &mut until => None,
+            } {
+                match heard {
+                    Some(Heard::Told(bytes)) => self.take_over(state, &bytes),
+                    Some(Heard::Asked(question)) => self.answer(state, question).await,
+                    None => return,
                 }
-                Heard::Asked(question) => self.queue.answer(question, bytes_of(&known(state))).await,
             }
+            let asking = self.queue.ask(&self.server);
+            tokio::pin!(asking);
+            let answer = loop {
+                tokio::select! {
+                    answer = &mut asking => break answer,
+                    heard = news.next() => match heard {
+                        Some(Heard::Told(bytes)) => self.take_over(state, &bytes),
+                        Some(Heard::Asked(question)) => self.answer(state, question).await,
+                        None => return,
+                    },
+                }
+            };
+            if let Some(known) = answer {
+                self.learn(state, news, &known);
+            }
+        }
+    }
+
+    /// Counts what another daemon tells.
+    fn take_over(&self, state: &AppState, told: &[u8]) {
+        let Ok(told) = serde_json::from_slice::<Told>(told) else { return };
+        if told.server == self.server || told.server.len() != NAME_CHARS {
+            return;
+        }
+        self.others.heard(&told.server, told.has_gpu);
+        for (owner, requests, works) in told.spent {
+            state.rates.add(&Owner::new(&owner), Spent { requests, works });
+        }
+        for strikes in told.strikes.iter().filter_map(Struck::strikes) {
+            state.jobs.quarantine().add(strikes);
+        }
+    }
+
+    /// Answers what this daemon knows and has told: the daemon that asks hears the rest like all others.
+    async fn answer(&self, state: &AppState, question: Question) {
+        let known = if question.server == self.server {
+            Known::default()
+        } else {
+            let of_day = state.rates.of_day(TOLD_MAX).into_iter().map(|(owner, used)| (owner.to_string(), used));
+            Known {
+                of_day: of_day.collect(),
+                strikes: state.jobs.quarantine().told().into_iter().map(Struck::from).collect(),
+            }
+        };
+        self.queue.answer(question, bytes_of(&known)).await;
+    }
+
+    /// Learns an answer. What was told before it comes first: it is counted on top of what was known, and the answer, which
+    /// contains it, is not.
+    fn learn(&self, state: &AppState, news: &mut News, known: &[u8]) {
+        while let Some(told) = news.told_by_now() {
+            self.take_over(state, &told);
+        }
+        let Ok(known) = serde_json::from_slice::<Known>(known) else { return };
+        let of_day = known.of_day.into_iter().filter(|(_, used)| used.is_finite());
+        state.rates.learn_of_day(of_day.map(|(owner, used)| (Owner::new(&owner), used)));
+        for strikes in known.strikes.iter().filter_map(Struck::strikes) {
+            state.jobs.quarantine().learn(strikes);
         }
     }
 }
@@ -149,29 +219,6 @@ impl Struck {
     fn strikes(&self) -> Option<Strikes> {
         let &Self { bytes, alone, compared, .. } = self;
         Some(Strikes { mesh: Digest::parse(&self.mesh)?, bytes, alone, compared })
-    }
-}
-
-fn take_over(state: &AppState, told: Told) {
-    for (owner, requests, works) in told.spent {
-        state.rates.add(&Owner::new(&owner), Spent { requests, works });
-    }
-    for strikes in told.strikes.iter().filter_map(Struck::strikes) {
-        state.jobs.quarantine().add(strikes);
-    }
-}
-
-/// What another daemon is told that asks.
-fn known(state: &AppState) -> Known {
-    let of_day = state.rates.of_day(TOLD_MAX).into_iter().map(|(owner, used)| (owner.to_string(), used)).collect();
-    Known { of_day, strikes: state.jobs.quarantine().all().into_iter().map(Struck::from).collect() }
-}
-
-fn learn(state: &AppState, known: Known) {
-    let of_day = known.of_day.into_iter().filter(|(_, used)| used.is_finite());
-    state.rates.learn_of_day(of_day.map(|(owner, used)| (Owner::new(&owner), used)), Duration::ZERO);
-    for strikes in known.strikes.iter().filter_map(Struck::strikes) {
-        state.jobs.quarantine().learn(strikes);
     }
 }
 

@@ -23,8 +23,7 @@ pub struct SharedJobs {
     /// The name of this daemon.
     pub(super) server: String,
     /// A permit for each job that this daemon has.
-    pub(super) slots: Arc<Semaphore>,
-    slot_count: u32,
+    pub(super) slots: Slots,
     /// A permit for each webhook that it tells.
     pub(super) telling: Arc<Semaphore>,
     pub(super) settlements: Arc<Settlements>,
@@ -32,6 +31,23 @@ pub struct SharedJobs {
     pub(super) end_time: Duration,
     /// The other daemons.
     pub(super) others: Others,
+}
+
+/// Permits for jobs of the queue. Those that ask for a GPU have their own, so that they do not wait behind all others here
+/// while another daemon could do them.
+pub(super) struct Slots {
+    /// For jobs that any daemon can do.
+    pub(super) any: Arc<Semaphore>,
+    /// For jobs that ask for a GPU.
+    pub(super) gpu: Arc<Semaphore>,
+    count: u32,
+}
+
+impl Slots {
+    fn new(count: usize) -> Self {
+        let [any, gpu] = [(); 2].map(|()| Arc::new(Semaphore::new(count)));
+        Self { any, gpu, count: u32::try_from(count).unwrap_or(u32::MAX) }
+    }
 }
 
 impl SharedJobs {
@@ -42,13 +58,11 @@ impl SharedJobs {
         settlements: Arc<Settlements>,
         end_time: Duration,
     ) -> Self {
-        let slots = jobs.shared_slots();
         Self {
             queue,
             store,
             server: JobId::fresh().to_string(),
-            slots: Arc::new(Semaphore::new(slots)),
-            slot_count: u32::try_from(slots).unwrap_or(u32::MAX),
+            slots: Slots::new(jobs.shared_slots()),
             telling: Arc::new(Semaphore::new(TELLING_MAX)),
             settlements,
             end_time,
@@ -66,7 +80,9 @@ impl SharedJobs {
 
     /// Waits, once the server drains, until this daemon has no job of the queue any more.
     pub async fn idle(&self) {
-        let _ = self.slots.acquire_many(self.slot_count).await;
+        for slots in [&self.slots.any, &self.slots.gpu] {
+            let _ = slots.acquire_many(self.slots.count).await;
+        }
     }
 
     /// The number of daemons of the service.

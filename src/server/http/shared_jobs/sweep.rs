@@ -81,8 +81,8 @@ impl SharedJobs {
         live.extend(self.queue.live(Kind::GpuJob).await?);
         let mut count = 0;
         for key in missing(jobs, &live) {
-            // One that cannot be read is ended by the server that takes its message.
-            let kind = self.store.job_record(key).await.ok().flatten().map_or(Kind::Job, |record| kind_of(&record));
+            // One whose object is damaged is ended by the server that takes its message.
+            let kind = self.store.job_record(key).await?.map_or(Kind::Job, |record| kind_of(&record));
             self.send_again(kind, key).await?;
             count += 1;
         }

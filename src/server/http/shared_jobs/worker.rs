@@ -9,7 +9,7 @@ use bytes::Bytes;
 use tokio::sync::OwnedSemaphorePermit;
 
 use super::accept::note_of;
-use super::end::with_end;
+use super::end::{Untold, with_end};
 use super::service::{SharedJobs, id_of};
 use crate::digest::Digest;
 use crate::durable::{ErrorRecord, FileRecord, JobKey, JobRecord, RecoveredJob, RequestRecord};
@@ -57,12 +57,8 @@ enum Ready {
 
 /// Takes jobs of a kind until the server drains.
 pub async fn run(shared: Arc<SharedJobs>, state: Arc<AppState>, kind: Kind) {
-    loop {
-        // No slot is kept free for jobs that may not come.
-        let permit = match kind {
-            Kind::GpuJob => None,
-            _ => shared.slots.clone().acquire_owned().await.ok(),
-        };
+    let slots = if kind == Kind::GpuJob { &shared.slots.gpu } else { &shared.slots.any };
+    while let Ok(permit) = slots.clone().acquire_owned().await {
         if state.is_draining() {
             return;
         }
@@ -70,35 +66,20 @@ pub async fn run(shared: Arc<SharedJobs>, state: Arc<AppState>, kind: Kind) {
             tokio::time::sleep(PAUSE).await;
             continue;
         }
-        let taken = match shared.queue.take(kind).await {
-            Ok(taken) => taken,
+        match shared.queue.take(kind).await {
+            Ok(None) => {}
+            Ok(Some(delivery)) => {
+                tokio::spawn(shared.clone().serve(state.clone(), delivery, permit));
+            }
             Err(error) => {
                 tracing::warn!(%error, "no job was taken");
                 tokio::time::sleep(PAUSE).await;
-                continue;
             }
-        };
-        let Some(delivery) = taken else { continue };
-        let permit = match permit {
-            Some(permit) => Some(permit),
-            None => shared.slot_for(&delivery).await,
-        };
-        if let Some(permit) = permit {
-            tokio::spawn(shared.clone().serve(state.clone(), delivery, permit));
         }
     }
 }
 
 impl SharedJobs {
-    /// A slot for a job that was taken without one. If none is free soon, the job is given back.
-    async fn slot_for(&self, delivery: &Delivery) -> Option<OwnedSemaphorePermit> {
-        let permit = tokio::time::timeout(SIGN_EVERY, self.slots.clone().acquire_owned()).await;
-        if permit.is_err() {
-            delivery.give_back(Duration::ZERO).await;
-        }
-        permit.ok()?.ok()
-    }
-
     /// Does the job of a message, and gives signs of life meanwhile.
     async fn serve(self: Arc<Self>, state: Arc<AppState>, delivery: Delivery, _permit: OwnedSemaphorePermit) {
         let Some(key) = delivery.key() else { return delivery.end().await };
@@ -138,9 +119,7 @@ impl SharedJobs {
                 let Note { owner, accepted_unix_ms, starts, .. } = note.unwrap_or_default();
                 let unknown = JobRecord { key, owner, accepted_unix_ms, ..JobRecord::default() };
                 let record = self.store.job_record(key).await.ok().flatten().unwrap_or(unknown);
-                let lost = failed(Failure::Lost);
-                self.bury(&record, starts, &lost).await;
-                return self.end_surely(state, key, EndedJob::of(&record), &lost).await;
+                return self.end_surely(state, &record, starts, &failed(Failure::Lost)).await;
             }
         };
         let note = Note { starts: note.map_or(0, |note| note.starts), ..note_of(&record) };
@@ -149,14 +128,12 @@ impl SharedJobs {
         drop((memory, blobs));
         let began = Instant::now();
         let ended = match ready {
-            Ready::Ended(ended) => {
-                self.bury(&record, note.starts, &ended).await;
-                Some(ended)
-            }
+            Ready::Ended(ended) => Some(ended),
             Ready::Work(work) => self.work(state, &record, *work, note.clone()).await?,
         };
         if let Some(JobState::Failed(failure)) = &ended
             && failure.is_without_gpu()
+            && record.needs_gpu
         {
             self.others.note_no_gpu();
             if self.others.may_have_gpu() {
@@ -171,7 +148,7 @@ impl SharedJobs {
         if began.elapsed() > ACK_WAIT && !self.is_still(&record).await.map_err(later)? {
             return Ok(());
         }
-        self.end_surely(state, key, EndedJob::of(&record), &ended).await
+        self.end_surely(state, &record, note.starts, &ended).await
     }
 
     /// True if the end of a job is in the store.
@@ -292,43 +269,20 @@ impl SharedJobs {
         }
     }
 
-    /// Keeps a job that is given up for people to look at.
-    async fn bury(&self, record: &JobRecord, starts: u32, end: &JobState) {
-        let is_given_up = |failure: &Failure| matches!(failure, Failure::Crashed { .. } | Failure::Lost);
-        if !matches!(end, JobState::Failed(failure) if is_given_up(failure)) {
-            return;
-        }
-        let described = |failure: &Failure| match failure {
-            // Clients are told of an internal error.
-            Failure::Lost => {
-                ErrorRecord { code: "lost".to_owned(), detail: failure.to_string(), ..error::record(failure) }
-            }
-            _ => error::record(failure),
-        };
-        let end = end_of(end, None, described);
-        let mut letter = RecoveredJob { record: record.clone(), starts, end: Some(end) };
-        let mut bytes = serde_json::to_vec(&letter).unwrap_or_default();
-        if bytes.len() > LETTER_BYTES_MAX {
-            letter.record.request = RequestRecord { kind: letter.record.request.kind, ..RequestRecord::default() };
-            letter.record.files.truncate(1);
-            letter.record.newer = None;
-            bytes = serde_json::to_vec(&letter).unwrap_or_default();
-        }
-        if let Err(error) = self.queue.bury(record.key, bytes).await {
-            tracing::warn!(%error, job = %id_of(record.key), "a job that is given up is not among the dead letters");
-        }
-    }
-
-    /// Ends a job, however long the store or the queue cannot be reached.
-    async fn end_surely(&self, state: &AppState, key: JobKey, job: EndedJob, end: &JobState) -> Result<(), Later> {
-        let (ended, content) = with_end(job, end);
-        let mut is_first = None;
+    /// Ends a job that was begun so often, however long the store or the queue cannot be reached.
+    async fn end_surely(&self, state: &AppState, record: &JobRecord, starts: u32, end: &JobState) -> Result<(), Later> {
+        let key = record.key;
+        let (ended, content) = with_end(EndedJob::of(record), end);
+        let (mut is_first, mut letter) = (None, letter_of(record, starts, end));
         loop {
-            let done = match is_first {
-                None => {
+            let done = match (is_first, &letter) {
+                (None, _) => {
                     self.store_end(key, &ended, content.clone(), end.name()).await.map(|first| is_first = Some(first))
                 }
-                Some(is_first) => match self.tell(key, &ended, is_first).await {
+                (Some(true), Some(bytes)) => {
+                    self.queue.bury(key, bytes.clone()).await.map(|()| letter = None).map_err(Untold::from)
+                }
+                (Some(is_first), _) => match self.tell(key, &ended, is_first).await {
                     Ok(()) => return Ok(()),
                     Err(error) => Err(error),
                 },
@@ -341,6 +295,30 @@ impl SharedJobs {
             tokio::time::sleep(PAUSE).await;
         }
     }
+}
+
+/// The dead letter of a job; None if it was not given up. Addresses of webhooks and names of requests may be secrets.
+fn letter_of(record: &JobRecord, starts: u32, end: &JobState) -> Option<Vec<u8>> {
+    let is_given_up = |failure: &Failure| matches!(failure, Failure::Crashed { .. } | Failure::Lost);
+    if !matches!(end, JobState::Failed(failure) if is_given_up(failure)) {
+        return None;
+    }
+    let described = |failure: &Failure| match failure {
+        // Clients are told of an internal error.
+        Failure::Lost => ErrorRecord { code: "lost".to_owned(), detail: failure.to_string(), ..error::record(failure) },
+        _ => error::record(failure),
+    };
+    let end = end_of(end, None, described);
+    let record = JobRecord { webhook: None, claim: None, ..record.clone() };
+    let mut letter = RecoveredJob { record, starts, end: Some(end) };
+    let bytes = serde_json::to_vec(&letter).ok()?;
+    if bytes.len() <= LETTER_BYTES_MAX {
+        return Some(bytes);
+    }
+    letter.record.request = RequestRecord { kind: letter.record.request.kind, ..RequestRecord::default() };
+    letter.record.files.truncate(1);
+    letter.record.newer = None;
+    serde_json::to_vec(&letter).ok()
 }
 
 /// The longest dead letter. NATS takes messages of 1 MB.

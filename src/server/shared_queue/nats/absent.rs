@@ -28,16 +28,25 @@ pub enum Heard {
 }
 
 /// No question.
-pub struct Question(Infallible);
+pub struct Question {
+    /// Nobody.
+    pub server: String,
+    nothing: Infallible,
+}
+
+/// An error: there is no NATS.
+pub async fn list_live(_: &QueueSettings) -> Result<Vec<(JobKey, Option<Note>)>, OpenError> {
+    Err(AddressError::Absent.into())
+}
+
+/// An error: there is no NATS.
+pub async fn list_dead(_: &QueueSettings) -> Result<Vec<(JobKey, Bytes)>, OpenError> {
+    Err(AddressError::Absent.into())
+}
 
 impl SharedQueue {
     /// An error: there is no NATS.
     pub async fn open(_: QueueSettings) -> Result<Self, OpenError> {
-        Err(AddressError::Absent.into())
-    }
-
-    /// An error: there is no NATS.
-    pub async fn open_made(_: QueueSettings) -> Result<Self, OpenError> {
         Err(AddressError::Absent.into())
     }
 
@@ -97,27 +106,37 @@ impl SharedQueue {
     }
 
     /// Unreachable.
-    pub async fn dead(&self) -> Result<Vec<Bytes>, QueueError> {
-        match self.0 {}
-    }
-
-    /// Unreachable.
     pub async fn tell(&self, _: Vec<u8>) -> Result<(), QueueError> {
         match self.0 {}
     }
 
     /// Unreachable.
-    pub async fn hear(&self) -> Result<(News, Option<Bytes>), QueueError> {
+    pub async fn hear(&self) -> Result<News, QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn hear_questions(&self, _: &mut News) -> Result<(), QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
+    pub async fn ask(&self, _: &str) -> Option<Bytes> {
         match self.0 {}
     }
 
     /// Unreachable.
     pub async fn answer(&self, question: Question, _: Vec<u8>) {
-        match question.0 {}
+        match question.nothing {}
     }
 }
 
 impl News {
+    /// Unreachable.
+    pub fn told_by_now(&mut self) -> Option<Bytes> {
+        match self.0 {}
+    }
+
     /// Unreachable.
     pub async fn next(&mut self) -> Option<Heard> {
         match self.0 {}

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use async_nats::Subscriber;
 use bytes::Bytes;
-use futures_util::StreamExt as _;
+use futures_util::{FutureExt as _, StreamExt as _};
 
 use super::{ANSWER_TIME, SharedQueue};
 use crate::shared_queue::QueueError;
@@ -18,7 +18,7 @@ const ASK_TIME: Duration = Duration::from_secs(2);
 /// What the daemons say, and what they ask.
 pub struct News {
     told: Subscriber,
-    asked: Subscriber,
+    asked: Option<Subscriber>,
 }
 
 /// Something that another daemon has sent.
@@ -29,8 +29,10 @@ pub enum Heard {
     Asked(Question),
 }
 
-/// A question of another daemon.
+/// A question of a daemon.
 pub struct Question {
+    /// The daemon that asks.
+    pub server: String,
     reply: async_nats::Subject,
 }
 
@@ -42,24 +44,34 @@ impl SharedQueue {
         told.map_err(|error| self.unavailable(&error))
     }
 
-    /// Hears what all tell and ask from now on. Returns what one of the others knows, too, if there is one.
-    pub async fn hear(&self) -> Result<(News, Option<Bytes>), QueueError> {
+    /// Hears what all tell from now on, and, once [`SharedQueue::hear_questions`] was called, what they ask.
+    pub async fn hear(&self) -> Result<News, QueueError> {
         self.check_connection()?;
-        let hearing = async {
-            let told = self.client.subscribe(self.subject_of("news")).await?;
-            // This daemon does not answer questions yet, and so not its own. Others tell nothing that it does not hear.
-            let known = self.ask().await;
-            let asked = self.client.queue_subscribe(self.subject_of("questions"), GROUP.to_owned()).await?;
-            Ok::<_, async_nats::SubscribeError>((News { told, asked }, known))
-        };
-        match tokio::time::timeout(ANSWER_TIME, hearing).await {
-            Ok(heard) => heard.map_err(|error| self.unavailable(&error)),
+        let told = self.subscribed(self.client.subscribe(self.subject_of("news"))).await?;
+        Ok(News { told, asked: None })
+    }
+
+    /// Hears some of the questions from now on: each is heard by one daemon.
+    pub async fn hear_questions(&self, news: &mut News) -> Result<(), QueueError> {
+        let asking = self.client.queue_subscribe(self.subject_of("questions"), GROUP.to_owned());
+        news.asked = Some(self.subscribed(asking).await?);
+        Ok(())
+    }
+
+    async fn subscribed(
+        &self,
+        subscribing: impl Future<Output = Result<Subscriber, async_nats::SubscribeError>>,
+    ) -> Result<Subscriber, QueueError> {
+        match tokio::time::timeout(ANSWER_TIME, subscribing).await {
+            Ok(subscribed) => subscribed.map_err(|error| self.unavailable(&error)),
             Err(_) => Err(self.error("no answer".to_owned())),
         }
     }
 
-    async fn ask(&self) -> Option<Bytes> {
-        let asking = self.client.request(self.subject_of("questions"), Bytes::new());
+    /// Asks a daemon what it knows: any one, this one too if it hears questions. None if nobody answers.
+    pub async fn ask(&self, server: &str) -> Option<Bytes> {
+        self.check_connection().ok()?;
+        let asking = self.client.request(self.subject_of("questions"), Bytes::copy_from_slice(server.as_bytes()));
         let answer = tokio::time::timeout(ASK_TIME, asking).await.ok()?.ok()?;
         Some(answer.payload)
     }
@@ -80,14 +92,27 @@ impl News {
     /// The next thing that is heard. None if there will be no more.
     pub async fn next(&mut self) -> Option<Heard> {
         loop {
+            let question = async {
+                match &mut self.asked {
+                    Some(asked) => asked.next().await,
+                    None => std::future::pending().await,
+                }
+            };
             tokio::select! {
                 told = self.told.next() => return Some(Heard::Told(told?.payload)),
-                asked = self.asked.next() => {
-                    if let Some(reply) = asked?.reply {
-                        return Some(Heard::Asked(Question { reply }));
+                asked = question => {
+                    let async_nats::Message { payload, reply, .. } = asked?;
+                    if let Some(reply) = reply {
+                        let server = String::from_utf8_lossy(&payload).into_owned();
+                        return Some(Heard::Asked(Question { server, reply }));
                     }
                 }
             }
         }
+    }
+
+    /// What was told and has arrived. None if there is nothing.
+    pub fn told_by_now(&mut self) -> Option<Bytes> {
+        Some(self.told.next().now_or_never()??.payload)
     }
 }

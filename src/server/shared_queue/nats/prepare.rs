@@ -1,6 +1,6 @@
 //! The connection to NATS, and what JetStream has of a queue: it is found there, or made.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use async_nats::jetstream::consumer::{AckPolicy, pull};
 use async_nats::jetstream::stream::{self, DiscardPolicy, RetentionPolicy, StorageType};
@@ -113,7 +113,7 @@ pub(super) async fn prepare(context: &Context, settings: &QueueSettings) -> Resu
     let notes = context.get_key_value(bucket).await.map_err(|error| unprepared(settings, &error))?;
     let dead = context.get_or_create_stream(dead_letters(&settings.address.name)).await;
     let dead = dead.map_err(|error| unprepared(settings, &error))?;
-    Ok(Handles { jobs, gpu_jobs, webhooks, notes, dead })
+    Ok(Handles { jobs, gpu_jobs, webhooks, notes, dead, since: Instant::now() })
 }
 
 /// The stream of dead letters. The oldest go first.

@@ -68,7 +68,16 @@ fn a_lost_stream_is_made_again_from_the_store() {
     let jobs: Vec<String> = (0..12).map(|i| job_of(&first.post(&format!("/v1/jobs?{}", query(i)), CUBE_OBJ))).collect();
     first.kill_9();
     service.nats.delete_stream("farm-jobs");
-    all_are_right(&service.server(&[]), &jobs);
+    let server = service.server(&[]);
+    all_are_right(&server, &jobs);
+    // Whatever is deleted while servers run is made anew.
+    for name in ["farm-jobs", "farm-gpu", "farm-webhooks", "farm-dead", "KV_farm"] {
+        service.nats.delete_stream(name);
+        all_are_right(&server, &[job_of(&server.post(&format!("/v1/jobs?{}", query(0)), CUBE_OBJ))]);
+        wait("the queue is whole", || {
+            String::from_utf8(server.get("/metrics").body).unwrap().contains("shared_queue_messages{kind=\"dead\"}")
+        });
+    }
 }
 
 #[test]

@@ -95,8 +95,8 @@ fn jobs_that_ask_for_a_gpu_find_a_server_that_has_one() {
     let [a, b] = [without(&["--workers", "2"]), without(&[])];
     let send =
         |server: &Server, size: u32| job_of(&server.post(&format!("/v1/jobs?backend=gpu&size={size}"), CUBE_OBJ));
-    let failed = end_of(&a, &send(&a, 32));
-    assert_eq!((&failed["state"], &failed["error"]["code"]), (&"failed".into(), &"backend_unavailable".into()));
+    // It waits for a server with a GPU, which may come.
+    let early = [send(&a, 31), send(&b, 32)];
     let picture = |server: &Server, job: &str, backend: &str| {
         let end = end_of(server, job);
         assert_eq!(end["state"], "done", "{end}");
@@ -111,10 +111,10 @@ fn jobs_that_ask_for_a_gpu_find_a_server_that_has_one() {
             text.lines().any(|line| line == "meshsnap_servers 3")
         })
     });
-    for (server, size) in [(&a, 33), (&b, 34), (&a, 35), (&b, 36), (&with, 37)] {
-        let job = send(server, size);
+    let later = [send(&a, 33), send(&b, 34), send(&with, 35)];
+    for (job, size) in early.iter().chain(&later).zip(31..) {
         let right = with.post(&format!("/v1/render?backend=gpu&size={size}"), CUBE_OBJ);
-        assert!(picture(&a, &job, "gpu") == right.body);
+        assert!(picture(&a, job, "gpu") == right.body);
     }
     let job = job_of(&a.post("/v1/jobs?size=38", CUBE_OBJ));
     picture(&b, &job, "cpu");
@@ -132,7 +132,8 @@ fn listed(service: &Service, more: &[&str]) -> Vec<serde_json::Value> {
 #[test]
 fn jobs_that_are_given_up_are_dead_letters() {
     let Some(service) = Service::new() else { return };
-    let server = service.server(&["--workers", "1"]);
+    let start = || service.server(&["--workers", "1", "--queue-jobs", "700"]);
+    let server = start();
     let slow = "/v1/jobs?style=wire&size=2000&samples=16";
     let jobs: Vec<String> = (0..6).map(|_| job_of(&server.post(slow, CUBE_OBJ))).collect();
     server.kill_9();
@@ -145,13 +146,15 @@ fn jobs_that_are_given_up_are_dead_letters() {
     let note = br#"{"owner":"local","accepted_unix_ms":5,"starts":5}"#;
     service.nats.publish(&format!("$KV.farm.{}", ids[5].replace('-', "")), note);
     std::fs::write(service.folder.path().join("jobs").join(ids[4].replace('-', "")), b"nothing").unwrap();
-    let server = service.server(&["--workers", "1"]);
+    let server = start();
     for (job, code) in [(&jobs[5], "crashed"), (&jobs[4], "internal")] {
         let end = end_of(&server, job);
         assert_eq!((&end["state"], &end["error"]["code"]), (&"failed".into(), &code.into()), "{end}");
     }
+    service.nats.publish("farm.dead.00000000000000000000000000000001", b"no letter");
     let dead = listed(&service, &["--dead"]);
-    assert_eq!(dead.len(), 2, "{dead:#?}");
+    assert_eq!(dead.len(), 3, "{dead:#?}");
+    assert_eq!(dead[0]["error"]["code"], "unreadable");
     for (id, code, starts) in [(ids[5], "crashed", 5), (ids[4], "lost", 0)] {
         let letter = dead.iter().find(|letter| letter["id"] == id).unwrap();
         assert_eq!((&letter["error"]["code"], &letter["state"]), (&code.into(), &"failed".into()), "{letter}");
@@ -159,12 +162,12 @@ fn jobs_that_are_given_up_are_dead_letters() {
         assert!(letter["ended_unix_ms"].as_u64() > Some(1_000_000_000_000), "{letter}");
     }
     let text = String::from_utf8(server.get("/metrics").body).unwrap();
-    assert!(text.contains("meshsnap_shared_queue_messages{kind=\"dead\"} 2"), "{text}");
+    assert!(text.contains("meshsnap_shared_queue_messages{kind=\"dead\"} 3"), "{text}");
     let mut plain = meshsnap();
     let output = plain.args(["jobs", "--dead", "--queue", &service.nats.address()]).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(
-        text.contains(ids[5]) && text.contains("crashed: ") && text.contains("2 dead letters (2 failed)"),
+        text.contains(ids[5]) && text.contains("crashed: ") && text.contains("3 dead letters (3 failed)"),
         "{text}"
     );
     for (address, words) in [
