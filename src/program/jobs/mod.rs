@@ -28,11 +28,12 @@ Examples:
 /// Arguments of `jobs`.
 #[derive(Args)]
 pub struct JobsArgs {
-    /// Folder of the server [default: that of `serve` without a --config]
-    #[arg(long, value_name = "DIR", env = "MESHSNAP_DATA_DIR", value_hint = ValueHint::DirPath)]
+    /// Folder of the server [env: MESHSNAP_DATA_DIR=] [default: that of `serve` without a --config]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     data_dir: Option<PathBuf>,
-    /// Queue that several servers share, instead of a data folder: its jobs that have not ended
-    #[arg(long, value_name = "nats://HOST:PORT/NAME")]
+    /// Queue that several servers share, instead of a data folder: its jobs that have not ended [env: MESHSNAP_QUEUE=, where
+    /// that is an address]
+    #[arg(long, value_name = "nats://HOST:PORT/NAME", conflicts_with = "data_dir")]
     queue: Option<String>,
     /// File of credentials (.creds) for that queue
     #[arg(long, value_name = "FILE", env = "MESHSNAP_QUEUE_CREDENTIALS_FILE", value_hint = ValueHint::FilePath)]
@@ -94,15 +95,21 @@ struct ResultLine<'a> {
 
 /// Prints the jobs, the oldest first.
 pub fn run(arguments: &JobsArgs) -> Result<(), CliError> {
-    match &arguments.queue {
-        Some(address) => of_queue(address, arguments),
-        None => of_folder(arguments),
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+    let of_environment = || {
+        let queue = set("MESHSNAP_QUEUE")?.into_string().ok()?;
+        // `serve` takes a number, too.
+        (arguments.data_dir.is_none() && queue.contains("://")).then_some(queue)
+    };
+    match arguments.queue.clone().or_else(of_environment) {
+        Some(address) => of_queue(&address, arguments),
+        None => of_folder(arguments, set("MESHSNAP_DATA_DIR").map(PathBuf::from)),
     }
 }
 
-fn of_folder(arguments: &JobsArgs) -> Result<(), CliError> {
+fn of_folder(arguments: &JobsArgs, of_environment: Option<PathBuf>) -> Result<(), CliError> {
     let given = arguments.data_dir.clone().filter(|folder| !folder.as_os_str().is_empty());
-    let folder = given.or_else(config::default_data_dir);
+    let folder = given.or(of_environment).or_else(config::default_data_dir);
     let folder = folder.ok_or_else(|| CliError::usage("there is no home folder: say --data-dir DIR"))?;
     let contents = durable::read(&folder).map_err(|error| match error {
         OpenError::Io { error, .. } if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {

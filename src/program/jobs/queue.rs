@@ -28,6 +28,7 @@ pub fn find(address: &str, arguments: &JobsArgs) -> Result<(Found, String), CliE
         address,
         credentials: file(&arguments.queue_credentials_file),
         ca: file(&arguments.queue_ca),
+        store: String::new(),
         jobs_max: defaults.queue_jobs,
         note_time: Duration::from_millis(defaults.unfetched_ttl_ms),
     };

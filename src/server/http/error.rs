@@ -207,6 +207,12 @@ impl ApiError {
         self.kind.status()
     }
 
+    /// The error for a job that asks for a GPU where no server of the service has one.
+    pub fn no_gpu_anywhere() -> Self {
+        let detail = "no server of the service has a GPU that can be used; ask for backend=auto or backend=cpu";
+        Self::new(ErrorKind::Content, "backend_unavailable", detail)
+    }
+
     fn deadline(detail: String) -> Self {
         Self::new(ErrorKind::Deadline, "deadline", detail).flag("--limit-job-ms")
     }

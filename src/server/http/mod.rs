@@ -197,10 +197,12 @@ async fn open_shared(config: &Config) -> Result<(Option<Shared>, Option<SharedQu
     let Some(address) = queue else { return Ok((Some(Shared::new(store)), None)) };
     store.check_conditions().await?;
     let words = address.words();
+    let store_name = store.join(&address.name).await?;
     let queue = SharedQueue::open(QueueSettings {
         address,
         credentials: config.queue_credentials.clone(),
         ca: config.queue_ca.clone(),
+        store: store_name,
         jobs_max: config.queue_jobs,
         note_time: Duration::from_millis(config.unfetched_ttl_ms),
     })

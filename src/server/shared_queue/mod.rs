@@ -116,6 +116,8 @@ pub struct QueueSettings {
     pub credentials: Option<PathBuf>,
     /// The file of certificates in PEM by which the servers are trusted.
     pub ca: Option<PathBuf>,
+    /// The name of the store that has its jobs.
+    pub store: String,
     /// Most jobs that wait, of all daemons.
     pub jobs_max: u64,
     /// The time after which notes are forgotten.
@@ -123,7 +125,7 @@ pub struct QueueSettings {
 }
 
 /// The kinds of messages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// A job is to be done.
     Job,

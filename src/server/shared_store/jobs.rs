@@ -13,6 +13,7 @@ use futures_util::TryStreamExt as _;
 use object_store::path::Path;
 use object_store::{GetOptions, ObjectStoreExt as _, PutMode, PutPayload};
 use serde::{Deserialize, Serialize};
+use uuid::Uuid;
 
 use super::objects::{line_of, split};
 use super::{ATTEMPTS_MORE, MARK, MARK_TEXT, OpenError, SharedStore, Unavailable};
@@ -74,6 +75,14 @@ pub enum FoundJob {
 /// The objects of jobs that exist, each with the time since it was written.
 pub type Ages = Vec<(JobKey, Duration)>;
 
+/// The queue of a store, and the store's name: the object `service`.
+#[derive(Serialize, Deserialize)]
+struct Service {
+    store: String,
+    queue: String,
+}
+
+const SERVICE: &str = "service";
 const JOBS: &str = "jobs";
 const RESULTS: &str = "results";
 const WEBHOOKS: &str = "webhooks";
@@ -105,6 +114,40 @@ impl SharedStore {
             }
             tokio::time::sleep(Duration::from_secs(1)).await;
         }
+    }
+
+    /// The name of this store, by which the queue `queue` knows it. The first server gives it one. A store has the jobs of
+    /// one queue.
+    pub async fn join(&self, queue: &str) -> Result<String, OpenError> {
+        let place = Path::from(SERVICE);
+        loop {
+            let found = match self.read_service(&place).await {
+                Ok(Some(found)) if found.queue == queue => return Ok(found.store),
+                Ok(Some(found)) => {
+                    let (address, needed) = (self.address.clone(), queue.to_owned());
+                    return Err(OpenError::OtherQueue { address, found: found.queue, needed });
+                }
+                Ok(None) => {
+                    let new = Service { store: Uuid::now_v7().to_string(), queue: queue.to_owned() };
+                    self.create(&place, line_of(&new).into()).await.map(drop)
+                }
+                Err(error) => Err(error),
+            };
+            if let Err(error) = found {
+                tracing::warn!(%error, "waiting for the shared store");
+                tokio::time::sleep(Duration::from_secs(1)).await;
+            }
+        }
+    }
+
+    async fn read_service(&self, place: &Path) -> Result<Option<Service>, Unavailable> {
+        let bytes = match self.objects.get(place).await {
+            Ok(found) => found.bytes().await.map_err(|cause| self.unavailable(cause))?,
+            Err(object_store::Error::NotFound { .. }) => return Ok(None),
+            Err(cause) => return Err(self.unavailable(cause)),
+        };
+        let unreadable = |_| Service { store: String::new(), queue: "(unreadable)".to_owned() };
+        Ok(Some(serde_json::from_slice(&bytes).unwrap_or_else(unreadable)))
     }
 
     /// Stores a job that is accepted. False if there is one with its id.

@@ -12,6 +12,7 @@
 //!   be deleted at any time.
 //! - `jobs/ID` and `results/ID`: a job that has not ended, and the end of one ([`jobs`]). Servers without a shared queue
 //!   write none.
+//! - `service`: the name of the shared queue whose jobs are here, and a name of this store by which that queue knows it.
 //! - `meshsnap`: marks the store as one. Each server writes it at its start, and looks from time to time whether it is there.
 //!
 //! [`objects`] has the form of the objects. [`s3`] opens a bucket.
@@ -108,6 +109,19 @@ pub enum OpenError {
     Unconditional {
         /// The address.
         address: String,
+    },
+    /// It has the jobs of another queue.
+    #[error(
+        "the shared store {address} has the jobs of the queue {found}, and --queue names {needed}; give each queue a store \
+         or a prefix of its own, or remove the object `service` if the other one is no more"
+    )]
+    OtherQueue {
+        /// The address.
+        address: String,
+        /// The queue whose jobs it has.
+        found: String,
+        /// The queue of this server.
+        needed: String,
     },
     /// The stored meshes of the data folder could not be put into it.
     #[error("{0}; the stored meshes of the data folder are to be put there")]

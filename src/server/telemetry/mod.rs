@@ -32,6 +32,10 @@ pub fn init(filter: &str, json: Option<bool>) -> Result<(), String> {
     ) {
         parsed = parsed.add_directive(quiet);
     }
+    // What the client of NATS says of its connection, `shared_queue` says once.
+    if let (false, Ok(quiet)) = (filter.contains("async_nats"), "async_nats=off".parse()) {
+        parsed = parsed.add_directive(quiet);
+    }
     let terminal = std::io::stderr().is_terminal();
     let text = !json.unwrap_or(!terminal);
     let lines = fmt::layer().with_writer(std::io::stderr);

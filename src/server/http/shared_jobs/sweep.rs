@@ -1,5 +1,5 @@
 //! Looks after the queue, one daemon at a time: jobs and webhooks that are in the store and not in the queue are sent to
-//! it again, and old ends are forgotten. A message can be missing because a daemon stopped while it accepted the job, or
+//! it again, messages about neither are removed, and old ends are forgotten. A message can be missing because a daemon stopped while it accepted the job, or
 //! because JetStream has lost it: it tells clients that a message is kept before it is on the disk.
 
 use std::collections::HashSet;
@@ -12,7 +12,6 @@ use crate::durable::JobKey;
 use crate::http::error::ApiError;
 use crate::jobs::unix_ms;
 use crate::shared_queue::Kind;
-use crate::shared_store::Ages;
 
 /// Time between two looks.
 const LOOK_EVERY: Duration = Duration::from_secs(10);
@@ -23,8 +22,8 @@ const AGE_MIN: Duration = Duration::from_secs(15);
 /// Time between two looks for old ends.
 const FORGET_EVERY: Duration = Duration::from_secs(600);
 
-/// Time for which the daemon that looks has this task to itself.
-const LEASE: Duration = Duration::from_secs(60);
+/// Time for which the daemon that looks has this task to itself. It makes it last longer with each look.
+const LEASE: Duration = Duration::from_secs(25);
 
 /// The name of the lease.
 const NAME: &str = "sweep";
@@ -32,6 +31,7 @@ const NAME: &str = "sweep";
 /// Looks until the process ends.
 pub async fn run(shared: Arc<SharedJobs>) {
     let mut forgot = Instant::now();
+    let (mut stale_jobs, mut stale_webhooks) = (HashSet::new(), HashSet::new());
     loop {
         tokio::time::sleep(LOOK_EVERY).await;
         if !shared.queue.is_connected() || shared.store.is_in_trouble() {
@@ -45,8 +45,8 @@ pub async fn run(shared: Arc<SharedJobs>) {
                 continue;
             }
         }
-        warn(shared.send_jobs_again().await);
-        warn(shared.send_webhooks_again().await);
+        warn(shared.compare(&[Kind::Job, Kind::GpuJob], &mut stale_jobs).await);
+        warn(shared.compare(&[Kind::Webhook], &mut stale_webhooks).await);
         if forgot.elapsed() >= FORGET_EVERY {
             forgot = Instant::now();
             warn(shared.forget_old_ends().await);
@@ -70,53 +70,45 @@ impl SharedJobs {
         Ok(())
     }
 
-    /// Sends messages about jobs that have none. The objects were listed before the messages are, so that none is
-    /// missing because it was written in between.
-    async fn send_jobs_again(&self) -> Result<(), ApiError> {
-        let jobs = self.store.jobs().await?;
-        if jobs.is_empty() {
-            return Ok(());
+    /// Sends messages about objects that have none, and removes messages that are about none: NATS 2.9 may keep them when
+    /// it is killed. `stale` are those of the last look, and then those of this one.
+    async fn compare(&self, kinds: &[Kind], stale: &mut HashSet<(Kind, JobKey)>) -> Result<(), ApiError> {
+        // The objects were listed before the messages are, so that none is missing because it was written in between.
+        let objects = match kinds {
+            [Kind::Webhook] => self.store.owed_webhooks().await?,
+            _ => self.store.jobs().await?,
+        };
+        let mut live = HashSet::new();
+        for kind in kinds {
+            live.extend(self.queue.live(*kind).await?.into_iter().map(|key| (*kind, key)));
         }
-        let mut live = self.queue.live(Kind::Job).await?;
-        live.extend(self.queue.live(Kind::GpuJob).await?);
-        let mut count = 0;
-        for key in missing(jobs, &live) {
+        let are_live: HashSet<JobKey> = live.iter().map(|(_, key)| *key).collect();
+        let mut sent = 0;
+        for (key, _) in objects.iter().filter(|(key, age)| *age > AGE_MIN && !are_live.contains(key)) {
+            self.send_again(kinds, *key).await?;
+            sent += 1;
+        }
+        let exist: HashSet<JobKey> = objects.into_iter().map(|(key, _)| key).collect();
+        let mut removed = 0;
+        // One without an object may have been accepted since, or end in this moment. After ten seconds it is neither.
+        let without: HashSet<_> = live.into_iter().filter(|(_, key)| !exist.contains(key)).collect();
+        for (kind, key) in without.intersection(stale) {
+            self.queue.remove(*kind, *key).await?;
+            removed += 1;
+        }
+        *stale = without;
+        if sent + removed > 0 {
+            tracing::warn!(sent, removed, "the queue had lost messages, or kept some of jobs that have ended");
+        }
+        Ok(())
+    }
+
+    async fn send_again(&self, kinds: &[Kind], key: JobKey) -> Result<(), ApiError> {
+        let kind = match kinds {
+            [kind] => *kind,
             // One whose object is damaged is ended by the server that takes its message.
-            let kind = self.store.job_record(key).await?.map_or(Kind::Job, |record| kind_of(&record));
-            self.send_again(kind, key).await?;
-            count += 1;
-        }
-        report(count);
-        Ok(())
-    }
-
-    /// The same for webhooks.
-    async fn send_webhooks_again(&self) -> Result<(), ApiError> {
-        let owed = self.store.owed_webhooks().await?;
-        if owed.is_empty() {
-            return Ok(());
-        }
-        let live = self.queue.live(Kind::Webhook).await?;
-        let mut count = 0;
-        for key in missing(owed, &live) {
-            self.send_again(Kind::Webhook, key).await?;
-            count += 1;
-        }
-        report(count);
-        Ok(())
-    }
-
-    async fn send_again(&self, kind: Kind, key: JobKey) -> Result<(), ApiError> {
+            _ => self.store.job_record(key).await?.map_or(Kind::Job, |record| kind_of(&record)),
+        };
         Ok(self.queue.send(kind, key, &message_name(key, unix_ms())).await?)
-    }
-}
-
-fn missing(objects: Ages, live: &HashSet<JobKey>) -> impl Iterator<Item = JobKey> {
-    objects.into_iter().filter(|(key, age)| *age > AGE_MIN && !live.contains(key)).map(|(key, _)| key)
-}
-
-fn report(count: usize) {
-    if count > 0 {
-        tracing::warn!(count, "the queue had lost messages, which are sent again");
     }
 }

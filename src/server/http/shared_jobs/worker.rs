@@ -127,7 +127,7 @@ impl SharedJobs {
         // From here on, the work counts its bytes.
         drop((memory, blobs));
         let began = Instant::now();
-        let ended = match ready {
+        let mut ended = match ready {
             Ready::Ended(ended) => Some(ended),
             Ready::Work(work) => self.work(state, &record, *work, note.clone()).await?,
         };
@@ -141,6 +141,7 @@ impl SharedJobs {
                 let _ = self.queue.set_note(key, &note).await;
                 return Err(Later(Duration::ZERO));
             }
+            ended = Some(failed(Failure::Recorded(record_of(ApiError::no_gpu_anywhere()))));
         }
         // This daemon may have noted since that the job runs.
         let Some(ended) = ended else { return self.note_end(key).await.map_err(later) };

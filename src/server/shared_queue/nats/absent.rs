@@ -71,6 +71,11 @@ impl SharedQueue {
     }
 
     /// Unreachable.
+    pub async fn remove(&self, _: Kind, _: JobKey) -> Result<(), QueueError> {
+        match self.0 {}
+    }
+
+    /// Unreachable.
     pub async fn note(&self, _: JobKey) -> Result<Option<(Note, Duration)>, QueueError> {
         match self.0 {}
     }

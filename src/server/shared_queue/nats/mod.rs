@@ -17,7 +17,7 @@ use async_nats::jetstream::Context;
 use async_nats::jetstream::consumer::PullConsumer;
 use async_nats::jetstream::kv::{self, CreateErrorKind, Operation, UpdateErrorKind};
 use async_nats::jetstream::message::PublishMessage;
-use async_nats::jetstream::stream::Stream;
+use async_nats::jetstream::stream::{LastRawMessageErrorKind, Stream};
 use async_nats::{Client, connection};
 use bytes::Bytes;
 use futures_util::{StreamExt as _, TryStreamExt as _};
@@ -146,6 +146,21 @@ impl SharedQueue {
         Ok(keys.await?.into_iter().collect())
     }
 
+    /// Removes the message about a job.
+    pub async fn remove(&self, kind: Kind, key: JobKey) -> Result<(), QueueError> {
+        let subject = &self.subject(kind, key);
+        let removing = self.twice(|handles| async move {
+            let stream = &handles.place(kind).stream;
+            // After a purge of the subject, NATS 2.9.10 delivers other messages that were not acknowledged no more.
+            match stream.get_last_raw_message_by_subject(subject).await {
+                Ok(message) => stream.delete_message(message.sequence).await.map(drop).map_err(to_words),
+                Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(()),
+                Err(error) => Err(words_of(&error)),
+            }
+        });
+        removing.await
+    }
+
     /// The note on a job, and its age.
     pub async fn note(&self, key: JobKey) -> Result<Option<(Note, Duration)>, QueueError> {
         self.twice(|handles| async move { note_of(&handles.notes, key).await }).await
@@ -240,11 +255,13 @@ impl SharedQueue {
             Ok(done) => return Ok(done),
             Err(cause) => cause,
         };
-        if since.elapsed() < PREPARE_EVERY {
-            return Err(self.error(cause));
-        }
+        tracing::debug!(cause, "an operation of the shared queue is tried again");
         tokio::time::sleep(DELETION_TIME).await;
         self.check_connection()?;
+        if since.elapsed() < PREPARE_EVERY {
+            let handles = self.handles.read().await.clone();
+            return does(handles).await.map_err(|cause| self.error(cause));
+        }
         let made = prepare(&self.context, &self.settings).await.map_err(|error| match error {
             Unprepared::ForNow(cause) => self.error(cause),
             Unprepared::ForGood(error) => self.error(error.to_string()),

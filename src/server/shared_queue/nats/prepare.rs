@@ -25,6 +25,9 @@ const CONSUMER: &str = "servers";
 /// The number of dead letters that are kept, and their age.
 const DEAD: (i64, Duration) = (10_000, Duration::from_secs(30 * 24 * 3600));
 
+/// The first line of a certificate in PEM.
+const CERTIFICATE: &[u8] = b"-----BEGIN CERTIFICATE-----";
+
 /// Reasons why a queue is not ready.
 pub(super) enum Unprepared {
     /// It may be later.
@@ -64,6 +67,8 @@ async fn options_of(settings: &QueueSettings) -> Result<ConnectOptions, OpenErro
         .event_callback(|event| async move {
             match event {
                 Event::Connected => tracing::info!("connected to the shared queue"),
+                // One for each attempt to connect again.
+                Event::ClientError(error) => tracing::debug!(%error, "the shared queue"),
                 Event::Disconnected => tracing::error!("the shared queue cannot be reached"),
                 other => tracing::warn!(event = %other, "the shared queue"),
             }
@@ -83,7 +88,10 @@ async fn options_of(settings: &QueueSettings) -> Result<ConnectOptions, OpenErro
             setting: "--queue-ca",
             cause: format!("{}: {cause}", path.display()),
         };
-        tokio::fs::metadata(path).await.map_err(error)?;
+        let text = tokio::fs::read(path).await.map_err(error)?;
+        if !text.windows(CERTIFICATE.len()).any(|part| part == CERTIFICATE) {
+            return Err(error(std::io::Error::other("it has no certificate in PEM")));
+        }
         options = options.add_root_certificates(path.clone());
     }
     Ok(options)
@@ -135,7 +143,7 @@ async fn place_of(context: &Context, settings: &QueueSettings, kind: Kind) -> Re
     let (name, word) = (&settings.address.name, word_of(kind));
     let wanted = stream::Config {
         name: format!("{name}-{word}"),
-        description: Some(format!("The {word} of servers of meshsnap")),
+        description: Some(format!("meshsnap, store {}", settings.store)),
         subjects: vec![format!("{name}.{word}.*")],
         retention: RetentionPolicy::WorkQueue,
         discard: DiscardPolicy::New,
@@ -152,6 +160,8 @@ async fn place_of(context: &Context, settings: &QueueSettings, kind: Kind) -> Re
             ("discard policy", format!("{:?}", config.discard)),
             ("subjects", config.subjects.join(" ")),
             ("max_msgs", config.max_messages.to_string()),
+            // Its jobs are in one store: servers with another would take their messages, and find nothing.
+            ("description", config.description.clone().unwrap_or_default()),
         ]
     };
     for ((what, found), (_, needed)) in texts(&found).into_iter().zip(texts(&wanted)) {

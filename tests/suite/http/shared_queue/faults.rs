@@ -80,6 +80,23 @@ fn a_lost_stream_is_made_again_from_the_store() {
     }
 }
 
+/// NATS 2.9 may keep messages of jobs that have ended, if it is killed.
+#[test]
+fn messages_about_no_job_are_removed() {
+    let Some(service) = Service::new() else { return };
+    let server = service.server(&["--queue-jobs", "9"]);
+    server.post("/v1/jobs?size=32", CUBE_OBJ);
+    let kept = |kind: &str| {
+        let text = String::from_utf8(server.get("/metrics").body).unwrap();
+        let name = format!("meshsnap_shared_queue_messages{{kind=\"{kind}\"}} ");
+        text.lines().find_map(|line| line.strip_prefix(&name)).map(|count| count.parse::<u32>().unwrap())
+    };
+    // Without a secret, no server takes messages about webhooks.
+    service.nats.publish("farm.webhooks.00000000000000000000000000000007", b"");
+    wait("it is there", || kept("webhooks") == Some(1));
+    wait("it is removed", || kept("webhooks") == Some(0));
+}
+
 #[test]
 fn a_full_queue_refuses_and_keeps_what_it_has() {
     let Some(service) = Service::new() else { return };

@@ -170,6 +170,9 @@ fn jobs_that_are_given_up_are_dead_letters() {
         text.contains(ids[5]) && text.contains("crashed: ") && text.contains("3 dead letters (3 failed)"),
         "{text}"
     );
+    let mut set = meshsnap();
+    let output = set.args(["jobs", "--dead"]).env("MESHSNAP_QUEUE", service.nats.address()).output().unwrap();
+    assert!(String::from_utf8(output.stdout).unwrap().contains("3 dead letters"));
     for (address, words) in [
         (service.nats.address() + "x", "no queue of this name"),
         ("nats://127.0.0.1:1/farm".to_owned(), "cannot be reached"),

@@ -52,6 +52,15 @@ fn wrong_settings_are_said_in_a_sentence() {
     for (flag, text) in [("--queue-credentials-file", "/nonexistent/x"), ("--queue-ca", "/nonexistent/y")] {
         usage(&mut command(&right, &store, &[flag, text]), &[flag, text]);
     }
+    usage(&mut command(&right, &store, &["--queue-ca", "/dev/null"]), &["--queue-ca", "no certificate"]);
+    // A queue has its jobs in one store, and a store those of one queue.
+    let other_folder = tempfile::tempdir().unwrap();
+    let other_store = of_folder(other_folder.path());
+    usage(&mut command(&right, &other_store, &["--queue-jobs", "7"]), &["farm-jobs", "description", "store"]);
+    let renamed = right.replace("/farm", "/barn");
+    usage(&mut command(&renamed, &store, &[]), &["the jobs of the queue farm", "--queue names barn"]);
+    std::fs::write(folder.path().join("service"), b"{").unwrap();
+    usage(&mut command(&right, &store, &["--queue-jobs", "7"]), &["the queue (unreadable)", "remove the object"]);
 }
 
 /// NATS with a certificate of an authority of one's own.
