@@ -11,6 +11,8 @@ is alone draws.
                                         # With --share .2, four of them leave 2 cores something for NATS and the client
     tests/bench/cluster.py homes        # 40 stored meshes in 6 looks each, in a random order, on 4 servers: how often a mesh
                                         # is read, and the CPU time of it all
+    tests/bench/cluster.py zipf         # 3,000 requests for pictures of 40 stored meshes, some far more often than others
+                                        # (Zipf), at 3 servers; then a server that starts cold is asked for all of them
     tests/bench/cluster.py model        # what servers and jobs cost NATS and the store, and what that means for 10, 100
                                         # and 1,000 servers
 
@@ -438,6 +440,34 @@ def homes(options):
     return done == len(jobs)
 
 
+def zipf(options):
+    """Where the pictures of stored meshes come from: this server's memory, the store, or a worker."""
+    _, servers = service(options, 3)
+    digests = []
+    for number in range(40):
+        mesh = sheet(number, 60)
+        digests.append(hashlib.sha256(mesh).hexdigest())
+        assert servers[0].ask("POST", "/v1/meshes?format_in=obj", mesh)[0] == 201
+    wanted = [(digest, size) for digest in digests for size in (128, 192, 256, 320)]
+    random.Random(3).shuffle(wanted)
+    asked = random.Random(5).choices(wanted, [1 / rank for rank in range(1, len(wanted) + 1)], k=3000)
+
+    def look(want, among):
+        answer = random.choice(among).ask("GET", f"/v1/meshes/{want[0]}/render.png?style=wire&size={want[1]}")
+        return answer[1].get("x-cache", "?") if answer and answer[0] == 200 else f"{answer and answer[0]}"
+
+    def count(wants, among):
+        with concurrent.futures.ThreadPoolExecutor(16) as pool:
+            outcomes = list(pool.map(lambda want: look(want, among), wants))
+        return {name: f"{100 * outcomes.count(name) / len(outcomes):.1f} %" for name in sorted(set(outcomes))}
+
+    print(f"3 servers, {len(asked)} requests for {len(set(asked))} pictures: {count(asked, servers)}")
+    cold = Server(options, servers[0].arguments)
+    outcomes = count(sorted(set(asked)), [cold])
+    print(f"a cold server, all of these once: {outcomes}")
+    return "miss" not in outcomes
+
+
 # Writes and reads a second of one prefix of a bucket on Amazon S3, by its documentation ("Best practices design patterns:
 # optimizing Amazon S3 performance").
 S3_WRITES, S3_READS = 3500, 5500
@@ -587,7 +617,7 @@ def submit_with_patience(servers, number):
 
 
 RUNS = {"kills": kills, "partition": partition, "slow-store": slow_store, "duplicates": duplicates, "scaling": scaling,
-        "homes": homes, "model": model}
+        "homes": homes, "zipf": zipf, "model": model}
 
 
 def main():
