@@ -2,7 +2,7 @@
 //! many in a burst, and how many uploads and jobs (POST and PUT) per day. What is used comes back steadily, not at
 //! once at the end of a second or a day (a token bucket).
 //!
-//! Where several servers are one service, each counts what clients have asked of all: it tells the others what it has
+//! Each server of a service of several counts what clients have asked of all: it tells the others what it has
 //! admitted ([`Rates::take_spent`]), and counts what they have ([`Rates::add`]). So a client may get ahead of a limit by
 //! what all servers admit until they have heard of each other, and then waits until that has come back.
 
@@ -50,13 +50,13 @@ impl TooMuch {
     }
 }
 
-/// What each party has asked for.
+/// The requests of each party.
 pub struct Rates {
     rate: Option<Limit>,
     day: Option<Limit>,
     used: Mutex<HashMap<Owner, Used>>,
     checks: AtomicU64,
-    /// What was admitted since the other servers were told. None: there are no others.
+    /// The requests that were admitted since the other servers were told. None: there are no others.
     untold: Option<Mutex<HashMap<Owner, Spent>>>,
 }
 
@@ -77,7 +77,7 @@ struct Limit {
     per_s: f64,
 }
 
-/// What a party has used of each limit and has not come back, at a moment.
+/// The part of each limit that a party has used and that has not come back, at a moment.
 #[derive(Clone, Copy)]
 struct Used {
     at: Instant,
@@ -135,7 +135,7 @@ impl Rates {
         Ok(())
     }
 
-    /// What was admitted since the last call.
+    /// The requests that were admitted since the last call.
     pub fn take_spent(&self) -> Vec<(Owner, Spent)> {
         self.untold.as_ref().map_or_else(Vec::new, |untold| std::mem::take(&mut *lock(untold)).into_iter().collect())
     }
@@ -159,7 +159,7 @@ impl Rates {
         used.day += f64::from(spent.works);
     }
 
-    /// What each party has used of its share of the day, but for what the others will be told of; at most `most` parties,
+    /// The part of its share of the day that each party has used, but for what the others will be told of; at most `most` parties,
     /// those that have used the most.
     pub fn of_day(&self, most: usize) -> Vec<(Owner, f64)> {
         let Some(limit) = &self.day else { return Vec::new() };
@@ -193,7 +193,7 @@ impl Rates {
         }
     }
 
-    /// What a party has used, less what has come back.
+    /// The use of a party, less what has come back.
     fn used_now<'a>(&self, all: &'a mut HashMap<Owner, Used>, party: &Owner) -> &'a mut Used {
         let now = Instant::now();
         let used = all.entry(party.clone()).or_insert(Used { at: now, rate: 0.0, day: 0.0 });
@@ -267,7 +267,7 @@ mod tests {
         assert!(count <= 1, "{count}");
     }
 
-    /// What a party is let have by several servers that tell each other what they admit, after each round.
+    /// Several servers tell each other what they admit, after each round.
     #[test]
     fn servers_that_tell_each_other_admit_one_share() {
         let servers = [(); 4].map(|()| Rates::new(0, 0, 100, true));

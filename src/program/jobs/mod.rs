@@ -49,7 +49,8 @@ pub struct JobsArgs {
     jsonl: bool,
 }
 
-/// A job in a line of JSON. Of a job in a queue that has not ended, less is known. What the state of a job over HTTP has, too, has the same name there.
+/// A job in a line of JSON. Of a job in a queue that has not ended, less is known. A field that the state of a job over HTTP
+/// has, too, has the same name there.
 #[derive(Serialize)]
 struct JobLine<'a> {
     id: String,

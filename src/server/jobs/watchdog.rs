@@ -81,7 +81,7 @@ impl Overdue {
 #[derive(Default)]
 pub struct Quarantine {
     meshes: Mutex<HashMap<Digest, Entry>>,
-    /// What other servers of the same service were not told of.
+    /// The strikes of which other servers of the same service were not told.
     untold: Mutex<Vec<Strikes>>,
 }
 

@@ -1,4 +1,4 @@
-//! What the daemons of a service tell each other: that they are there, and whether they have a GPU; what they have admitted
+//! The news that the daemons of a service tell each other: that they are there, and whether they have a GPU; what they have admitted
 //! of each client's share (`crate::rates`); and which meshes have kept their workers busy. A daemon that starts, or that was
 //! cut off, asks one of the others what it knows.
 //!

@@ -1,4 +1,4 @@
-//! What a daemon knows of the others of its service: how many there are, and whether they have a GPU.
+//! The other daemons of a service, as one of them knows them: their number, and whether they have a GPU.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,7 +22,7 @@ const GPU_WAIT: Duration = Duration::from_secs(120);
 /// Most daemons that are known.
 const SERVERS_MAX: usize = 10_000;
 
-/// What this daemon knows of the others.
+/// The other daemons of the service.
 pub struct Others {
     /// The daemons, each with the moment at which it was last heard of.
     known: Mutex<HashMap<String, Instant>>,

@@ -1,4 +1,4 @@
-//! What a daemon gets from the queue: a message about a job, and the notes on a job as they change.
+//! A message about a job, which a daemon gets from the queue, and the notes on a job as they change.
 
 use std::time::Duration;
 

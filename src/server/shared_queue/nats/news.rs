@@ -1,4 +1,5 @@
-//! What daemons of a service tell each other without JetStream: it is not kept, and who is away misses it.
+//! News and questions of the daemons of a service, without JetStream: they are not kept, and a daemon that is away misses
+//! them.
 
 use std::time::Duration;
 
@@ -15,7 +16,7 @@ const GROUP: &str = "servers";
 /// The longest time for which an answer of another daemon is waited for.
 const ASK_TIME: Duration = Duration::from_secs(2);
 
-/// What the daemons say, and what they ask.
+/// The news and the questions of the daemons.
 pub struct News {
     told: Subscriber,
     asked: Option<Subscriber>,
@@ -111,7 +112,7 @@ impl News {
         }
     }
 
-    /// What was told and has arrived. None if there is nothing.
+    /// The next news that has arrived already. None if there is none.
     pub fn told_by_now(&mut self) -> Option<Bytes> {
         Some(self.told.next().now_or_never()??.payload)
     }
