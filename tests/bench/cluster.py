@@ -9,6 +9,9 @@ is alone draws.
     tests/bench/cluster.py duplicates   # 1,000 clients want 50 pictures
     tests/bench/cluster.py scaling      # 1, 2 and 4 servers, each with half a core; and what the queue costs per job.
                                         # With --share .2, four of them leave 2 cores something for NATS and the client
+    tests/bench/cluster.py embedded --before OTHER/meshsnap
+                                        # a server that is alone, with its data folder, beside one of another build: jobs and
+                                        # pictures in turns, their times, CPU time and memory
     tests/bench/cluster.py homes        # 40 stored meshes in 6 looks each, in a random order, on 4 servers: how often a mesh
                                         # is read, and the CPU time of it all
     tests/bench/cluster.py zipf         # 3,000 requests for pictures of 40 stored meshes, some far more often than others
@@ -402,6 +405,54 @@ def scaling(options):
     return rates[4] / rates[1] / 4 >= 0.85
 
 
+def memory_mb(pid):
+    """Memory of a process of its own, and of its files that are mapped."""
+    with open(f"/proc/{pid}/status", encoding="ascii") as file:
+        fields = dict(line.split(":", 1) for line in file)
+    return [int(fields[name].split()[0]) / 1024 for name in ("RssAnon", "RssFile")]
+
+
+def embedded(options):
+    """Servers of two builds that are alone, in turns. Five pairs: memory differs a little from start to start."""
+    if not options.before:
+        sys.exit("--before names the other build's program")
+    binaries, values = {"before": os.path.abspath(options.before), "now": options.binary}, {"before": {}, "now": {}}
+
+    def note(build, name, value):
+        values[build].setdefault(name, []).append(value)
+
+    for pair in range(5):
+        servers = {}
+        for build in sorted(binaries, reverse=pair % 2 == 1):
+            options.binary = binaries[build]
+            servers[build] = Server(options, ["--data-dir", os.path.join(options.folder, f"data-{build}-{pair}")])
+        time.sleep(2)
+        for build, server in servers.items():
+            for name, value in zip(("idle: own MB", "idle: mapped MB"), memory_mb(server.process.pid)):
+                note(build, name, value)
+        for number in range(300):
+            for build in sorted(servers, reverse=number % 2 == 1):
+                server, began = servers[build], time.time()
+                end_of([server], submit([server], number, path="style=flat&size=32"), time.time() + 60)
+                note(build, "job ms", (time.time() - began) * 1e3)
+                began = time.time()
+                assert server.ask("POST", f"/v1/render?{query(number)}", CUBE)[0] == 200
+                note(build, "picture ms", (time.time() - began) * 1e3)
+        for build, server in servers.items():
+            note(build, "CPU s", cpu_s(server.process.pid))
+            for name, value in zip(("after work: own MB", "after work: mapped MB"), memory_mb(server.process.pid)):
+                note(build, name, value)
+            server.kill()
+    ratios = {}
+    for name in values["now"]:
+        before, now = (statistics.median(values[build][name]) for build in ("before", "now"))
+        ratios[name] = now / before
+        print(f"{name}: {before:.2f} before, {now:.2f} now, ratio {ratios[name]:.3f}")
+    print("program: " + ", ".join(f"{os.path.getsize(binary) / 1e6:.1f} MB {build}" for build, binary in binaries.items()))
+    # Repeated runs with the same program on both sides differ by up to 5 %.
+    return all(ratio <= 1.05 for name, ratio in ratios.items() if "mapped" not in name)
+
+
 def sheet(number, side=120):
     """A sheet with bumps, of 28,000 triangles."""
     lines = [f"v {i} {j} {(i * number + j * 7) % 41 * .05}" for i in range(side) for j in range(side)]
@@ -617,7 +668,7 @@ def submit_with_patience(servers, number):
 
 
 RUNS = {"kills": kills, "partition": partition, "slow-store": slow_store, "duplicates": duplicates, "scaling": scaling,
-        "homes": homes, "zipf": zipf, "model": model}
+        "embedded": embedded, "homes": homes, "zipf": zipf, "model": model}
 
 
 def main():
@@ -629,6 +680,7 @@ def main():
     parser.add_argument("--nodes", type=int, default=4)
     parser.add_argument("--nats", default=shutil.which("nats-server") or "/usr/sbin/nats-server")
     parser.add_argument("--share", type=float, default=0.5, help="of a core, for each server of `scaling`")
+    parser.add_argument("--before", help="the program of another build, for `embedded`")
     parser.add_argument("--keep")
     options = parser.parse_args()
     options.binary, options.store = os.path.abspath(options.binary), None

@@ -40,6 +40,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
+use futures_util::FutureExt as _;
 use tokio::net::TcpListener;
 
 use crate::config::{Config, cores};
@@ -118,6 +119,7 @@ pub fn serve(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     served
 }
 
+/// Futures of the engines' clients are boxed here: they are large, and a server that is alone needs no stack for them.
 async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), ServeError> {
     let keys = Keys::open(&config.api_keys, config.api_keys_file.as_deref())?;
     let listen_error = |error| ServeError::Listen { listen: config.listen.clone(), error };
@@ -191,6 +193,14 @@ async fn open_shared(config: &Config) -> Result<(Option<Shared>, Option<SharedQu
             Some(_) => Err(shared_queue::OpenError::from(shared_queue::AddressError::NoStore).into()),
         };
     };
+    connect(config, address, queue).boxed_local().await
+}
+
+async fn connect(
+    config: &Config,
+    address: &str,
+    queue: Option<shared_queue::Address>,
+) -> Result<(Option<Shared>, Option<SharedQueue>), ServeError> {
     let store = SharedStore::new(address).map_err(shared_store::OpenError::from)?;
     store.reach().await?;
     tracing::info!(address, "the shared store answers");
@@ -219,7 +229,7 @@ async fn take_over(
 ) -> Result<bool, ServeError> {
     if let Some(shared) = &state.shared {
         let handed_over = tokio::select! {
-            handed_over = recovery::hand_over(state, shared, &mut recovered) => handed_over.map(|()| true),
+            handed_over = recovery::hand_over(state, shared, &mut recovered).boxed_local() => handed_over.map(|()| true),
             () = signals.next() => Ok(false),
         };
         if !matches!(handed_over, Ok(true)) {
@@ -234,7 +244,7 @@ async fn take_over(
     }
     recovery::recover(state, recovered);
     if let Some(jobs) = &state.shared_jobs {
-        shared_jobs::start(jobs, state).await;
+        shared_jobs::start(jobs, state).boxed_local().await;
     }
     Ok(true)
 }

@@ -7,6 +7,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 
 use super::others::announce_every;
@@ -132,36 +133,29 @@ impl SharedJobs {
     }
 
     async fn hear_of(&self, state: &AppState, news: &mut News) {
+        // What is missed while NATS is away is learnt with the next question.
+        let mut question = Box::pin(self.ask_later());
         loop {
-            // What is missed while NATS is away is learnt with the next question.
-            let until = tokio::time::sleep(ASK_EVERY);
-            tokio::pin!(until);
-            while let Some(heard) = tokio::select! {
-                heard = news.next() => Some(heard),
-                () = &mut until => None,
-            } {
-                match heard {
+            tokio::select! {
+                known = &mut question => {
+                    if let Some(known) = known {
+                        self.learn(state, news, &known);
+                    }
+                    question.set(self.ask_later());
+                }
+                heard = news.next() => match heard {
                     Some(Heard::Told(bytes)) => self.take_over(state, &bytes),
                     Some(Heard::Asked(question)) => self.answer(state, question).await,
                     None => return,
-                }
-            }
-            let asking = self.queue.ask(&self.server);
-            tokio::pin!(asking);
-            let answer = loop {
-                tokio::select! {
-                    answer = &mut asking => break answer,
-                    heard = news.next() => match heard {
-                        Some(Heard::Told(bytes)) => self.take_over(state, &bytes),
-                        Some(Heard::Asked(question)) => self.answer(state, question).await,
-                        None => return,
-                    },
-                }
-            };
-            if let Some(known) = answer {
-                self.learn(state, news, &known);
+                },
             }
         }
+    }
+
+    /// The answer of another daemon that is asked a while from now what it knows.
+    async fn ask_later(&self) -> Option<Bytes> {
+        tokio::time::sleep(ASK_EVERY).await;
+        self.queue.ask(&self.server).await
     }
 
     /// Counts what another daemon tells.
