@@ -262,8 +262,8 @@ pub fn with_scene<R>(
         Some(_) => None,
         None => plan::framing(mesh, spec, prepared, budget, deadline)?,
     };
-    let fitted = view.framing.or(framing.as_deref()).unwrap_or(&mesh.positions);
-    let scene = Scene::framed_by(fitted, mesh, spec, budget)?;
+    let boxes = prepared.position_boxes(mesh, budget).map_err(SceneError::Limit)?;
+    let scene = Scene::framed_by(view.framing.or(framing.as_deref()), &boxes, mesh, spec, budget)?;
     let warnings = StagingWarnings {
         of_selection: selected.as_ref().map(|selected| selected.warnings.clone()).unwrap_or_default(),
         of_layout: layout.as_ref().map(|layout| layout.warnings.clone()).unwrap_or_default(),

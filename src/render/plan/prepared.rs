@@ -9,12 +9,14 @@
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use crate::limits::{Budget, LimitExceeded, Spent};
+use crate::mesh::Mesh;
 use crate::mesh::creases::CreasedNormals;
 use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::Orientation;
 use crate::plan::cut_outs::CutOuts;
 use crate::plan::edges::face_runs::FaceRuns;
 use crate::plan::lines::picked_faces::PickedFace;
+use crate::scene::PositionBoxes;
 use crate::texture::kept::KeptTextures;
 
 /// Facts about one mesh, which must not change. Each is found when a plan first needs it. Plans that
@@ -30,6 +32,8 @@ pub struct Prepared {
     pub(super) picked_faces: Fact<Vec<PickedFace>>,
     /// The runs of faces.
     pub(super) face_runs: Fact<FaceRuns>,
+    /// Boxes around the positions.
+    position_boxes: Fact<PositionBoxes>,
     /// Visible parts of the faces with cut-out textures.
     pub(super) cut_outs: Fact<CutOuts>,
     vertex_normals: Mutex<Option<VertexNormals>>,
@@ -62,6 +66,11 @@ impl Prepared {
     /// The mesh's identity.
     pub fn token(&self) -> Arc<MeshToken> {
         Arc::clone(&self.token)
+    }
+
+    /// Boxes around the mesh's positions.
+    pub fn position_boxes(&self, mesh: &Mesh, budget: &mut Budget) -> Result<Arc<PositionBoxes>, LimitExceeded> {
+        self.position_boxes.get_or_find(budget, |budget| PositionBoxes::of(&mesh.positions, budget))
     }
 
     /// The orientation of the faces.
@@ -103,8 +112,9 @@ impl Prepared {
         let normals = self.locked_normals().as_ref().map_or(0, VertexNormals::bytes);
         let picked = self.picked_faces.known().map_or(0, |faces| size_of_val(&faces[..]));
         let runs = self.face_runs.known().map_or(0, FaceRuns::bytes);
+        let boxes = self.position_boxes.known().map_or(0, PositionBoxes::bytes);
         let cut_outs = self.cut_outs.known().map_or(0, CutOuts::bytes);
-        (edges + normals + picked + runs + cut_outs) as u64 + self.textures.bytes()
+        (edges + normals + picked + runs + boxes + cut_outs) as u64 + self.textures.bytes()
     }
 
     fn locked_normals(&self) -> MutexGuard<'_, Option<VertexNormals>> {

@@ -10,6 +10,7 @@
 use glam::{DVec2, DVec3};
 
 use super::extents::{Extents, turned_extents};
+use super::position_boxes::BoxedPositions;
 use crate::mesh::material::{FileCamera, FileLens};
 use crate::mesh::{Mesh, UpAxis};
 use crate::spec::{CameraSpec, ProjectionKind as Kind};
@@ -51,9 +52,15 @@ pub struct Border {
 }
 
 impl Camera {
-    /// Places the camera for a picture of `size_px`, fitted to those of the mesh's positions that are in
+    /// Places the camera for a picture of `size_px`, fitted to those of the mesh's positions (`all`) that are in
     /// `framing`.
-    pub fn place(spec: &CameraSpec, mesh: &Mesh, framing: &[[f32; 3]], size_px: [u32; 2], border: Border) -> Self {
+    pub fn place(
+        spec: &CameraSpec,
+        mesh: &Mesh,
+        [framing, all]: [BoxedPositions<'_>; 2],
+        size_px: [u32; 2],
+        border: Border,
+    ) -> Self {
         let size = DVec2::new(f64::from(size_px[0]), f64::from(size_px[1]));
         let up = spec.up.unwrap_or(mesh.up);
         let free = |v: f64| (1.0 - 2.0 * spec.margin - 2.0 * border.px / v).max(0.05);
@@ -72,9 +79,11 @@ impl Camera {
             _ => (named_axes(spec, up), None),
         };
         let slopes = tangents * inner;
-        let extents_of = |positions: &[[f32; 3]]| match spec.fits_turn {
-            true => turned_extents(positions, mesh, (axes, frame(up)[1]), sin_cos_deg(spec.elevation_deg()), slopes),
-            false => Extents::new(positions, axes, slopes),
+        let extents_of = |framing: BoxedPositions<'_>| match spec.fits_turn {
+            true => {
+                turned_extents(framing.positions, mesh, (axes, frame(up)[1]), sin_cos_deg(spec.elevation_deg()), slopes)
+            }
+            false => Extents::new(framing, axes, slopes),
         };
         let extents = extents_of(framing);
         let mut camera = match (spec.projection, explicit) {
@@ -95,7 +104,8 @@ impl Camera {
             }
         };
         // What does not frame the picture has a depth, too.
-        let extents = if framing.len() == mesh.positions.len() { extents } else { extents_of(&mesh.positions) };
+        let is_all = framing.positions.len() == all.positions.len();
+        let extents = if is_all { extents } else { extents_of(all) };
         camera.set_range(&extents, border.grow + border.around, size);
         camera.set_reach(&extents, slopes);
         camera

@@ -1,21 +1,19 @@
 //! The bounds of a mesh as a camera sees it, to which the camera is fitted: the least and the largest
 //! coordinates along the camera's axes, and how far vertices reach towards the four sides of the view
-//! pyramid. For a single view, blocks of vertices that cannot change the result are left out. For a
+//! pyramid. For a single view, vertices whose boxes (`position_boxes`) show that they cannot change the result are left out. For a
 //! turntable, the bounds are those of a whole turn.
 
 use glam::{DVec2, DVec3};
 
+use super::position_boxes::{BLOCK, BoxedPositions, GROUP, middle_and_half};
 use crate::mesh::Mesh;
 use crate::parallel::map;
 
 /// Vertices that are looked at side by side.
 const LANES: usize = 4;
 
-/// Vertices whose box says whether any of them can be the farthest in some direction.
-const BLOCK: usize = 64;
-
-/// Vertices that a thread takes at a time.
-const PIECE: usize = 1 << 14;
+/// Groups of vertices that a thread takes at a time.
+const CHUNK: usize = 16;
 
 /// Rounding errors of coordinates in camera axes, per unit of the box: a generous limit.
 const ROUNDED: f64 = 1e-12;
@@ -34,14 +32,30 @@ pub struct Extents {
 
 impl Extents {
     /// The bounds along these axes, and in the view pyramid of these slopes.
-    pub fn new(positions: &[[f32; 3]], axes: [DVec3; 3], slopes: DVec2) -> Self {
+    pub fn new(framing: BoxedPositions<'_>, axes: [DVec3; 3], slopes: DVec2) -> Self {
+        let BoxedPositions { positions, boxes } = framing;
         if positions.is_empty() {
             let nothing = DVec2::NEG_INFINITY;
             return Self { low: DVec3::ZERO, high: DVec3::ZERO, plus: nothing, minus: nothing };
         }
         let farthest = Farthest::new(axes, slopes);
-        let pieces = map(positions.chunks(PIECE).collect(), |piece| farthest.lanes_of(piece));
+        let group = |i: usize| {
+            let blocks = &boxes.blocks[i * BLOCKS..boxes.blocks.len().min((i + 1) * BLOCKS)];
+            positions[i * GROUP..].chunks(BLOCK).zip(blocks)
+        };
+        let reaches: Vec<Reach> = boxes.groups.iter().map(|around| farthest.reach(around)).collect();
         let mut lanes = ExtentLanes::EMPTY;
+        // The block that may reach the farthest in each direction: few others reach farther than all of these.
+        for way in 0..WAYS {
+            let first = (0..reaches.len()).max_by(|&a, &b| reaches[a][way].total_cmp(&reaches[b][way])).unwrap_or(0);
+            let reach = |around: &[[f32; 3]; 2]| farthest.reach(around)[way];
+            let block = group(first).max_by(|(_, a), (_, b)| reach(a).total_cmp(&reach(b)));
+            block.into_iter().for_each(|(block, _)| farthest.add(block, &mut lanes));
+        }
+        let least = lanes.farthest();
+        let far: Vec<usize> = (0..reaches.len()).filter(|&i| !is_within(&reaches[i], &least)).collect();
+        let pieces =
+            map(far.chunks(CHUNK).collect(), |chunk| farthest.lanes_of(chunk.iter().flat_map(|&i| group(i)), &least));
         pieces.iter().for_each(|piece| lanes.merge(piece));
         let least = |v: [f64; LANES]| v.into_iter().fold(f64::INFINITY, f64::min);
         let most = |v: [f64; LANES]| v.into_iter().fold(f64::NEG_INFINITY, f64::max);
@@ -77,14 +91,23 @@ impl Extents {
     }
 }
 
+/// The number of directions of a search.
+const WAYS: usize = 10;
+
+/// Blocks of a group.
+const BLOCKS: usize = GROUP / BLOCK;
+
+/// A distance in each direction.
+type Reach = [f64; WAYS];
+
 /// The search for the farthest vertices in ten directions: to both sides along each axis, and across the
 /// four planes of a view pyramid.
 struct Farthest {
     axes: [DVec3; 3],
     slopes: DVec2,
-    directions: [DVec3; 10],
+    directions: [DVec3; WAYS],
     /// Distance up to which rounding may move a vertex along each direction.
-    rounded: [f64; 10],
+    rounded: Reach,
 }
 
 impl Farthest {
@@ -95,55 +118,49 @@ impl Farthest {
         Self { axes, slopes, directions, rounded: directions.map(|way| ROUNDED * (1.0 + way.abs().element_sum())) }
     }
 
-    /// The bounds of some positions. Blocks whose boxes lie within the bounds so far are left out.
-    fn lanes_of(&self, positions: &[[f32; 3]]) -> ExtentLanes {
+    /// The farthest that a vertex in a box may reach.
+    fn reach(&self, around: &[[f32; 3]; 2]) -> Reach {
+        let [middle, half] = middle_and_half(around);
+        std::array::from_fn(|i| {
+            let way = self.directions[i];
+            way.dot(middle) + way.abs().dot(half) + self.rounded[i]
+        })
+    }
+
+    /// The bounds of some blocks with their boxes. Blocks that reach no farther than `least`, or than the blocks before,
+    /// are left out.
+    fn lanes_of<'p>(
+        &self,
+        blocks: impl Iterator<Item = (&'p [[f32; 3]], &'p [[f32; 3]; 2])>,
+        least: &Reach,
+    ) -> ExtentLanes {
         let mut lanes = ExtentLanes::EMPTY;
-        let mut farthest = lanes.farthest();
-        for block in positions.chunks(BLOCK) {
-            if self.is_within(box_of(block), &farthest) {
-                continue;
+        let mut farthest = *least;
+        for (block, around) in blocks {
+            if !is_within(&self.reach(around), &farthest) {
+                self.add(block, &mut lanes);
+                let found = lanes.farthest();
+                farthest = std::array::from_fn(|i| found[i].max(least[i]));
             }
-            let (fours, rest) = block.as_chunks();
-            fours.iter().for_each(|four| lanes.add(four, self.axes, self.slopes));
-            if !rest.is_empty() {
-                let mut last = [rest[0]; LANES];
-                last[..rest.len()].copy_from_slice(rest);
-                lanes.add(&last, self.axes, self.slopes);
-            }
-            farthest = lanes.farthest();
         }
         lanes
     }
 
-    /// True if no vertex in a box goes beyond what is the farthest in each direction.
-    fn is_within(&self, [low, high]: [DVec3; 2], farthest: &[f64; 10]) -> bool {
-        let (middle, half) = ((low + high) * 0.5, (high - low) * 0.5);
-        let ways = self.directions.iter().zip(&self.rounded).zip(farthest);
-        ways.fold(true, |is_within, ((way, rounded), farthest)| {
-            is_within & (way.dot(middle) + way.abs().dot(half) + rounded < *farthest)
-        })
+    /// Adds the bounds of at least one position.
+    fn add(&self, block: &[[f32; 3]], lanes: &mut ExtentLanes) {
+        let (fours, rest) = block.as_chunks();
+        fours.iter().for_each(|four| lanes.add(four, self.axes, self.slopes));
+        if let Some(first) = rest.first() {
+            let mut last = [*first; LANES];
+            last[..rest.len()].copy_from_slice(rest);
+            lanes.add(&last, self.axes, self.slopes);
+        }
     }
 }
 
-/// The box around at least one position.
-fn box_of(block: &[[f32; 3]]) -> [DVec3; 2] {
-    // Four positions side by side, and twice the last ones.
-    let (mut low, mut high) = ([f32::INFINITY; 3 * LANES], [f32::NEG_INFINITY; 3 * LANES]);
-    let mut add = |four: &[f32; 3 * LANES]| {
-        // Not `f32::min` and `max`, which look for NaN.
-        low = std::array::from_fn(|i| if four[i] < low[i] { four[i] } else { low[i] });
-        high = std::array::from_fn(|i| if four[i] > high[i] { four[i] } else { high[i] });
-    };
-    let flat = block.as_flattened();
-    let (fours, rest) = flat.as_chunks();
-    fours.iter().for_each(&mut add);
-    for one in rest.as_chunks::<3>().0 {
-        add(&std::array::from_fn(|i| one[i % 3]));
-    }
-    let over = |v: [f32; 3 * LANES], pick: fn(f32, f32) -> f32| {
-        DVec3::from([0, 1, 2].map(|k| f64::from((1..LANES).fold(v[k], |found, lane| pick(found, v[3 * lane + k])))))
-    };
-    [over(low, f32::min), over(high, f32::max)]
+/// True if nothing that reaches no farther than `reach` goes beyond what is the farthest in each direction.
+fn is_within(reach: &Reach, farthest: &Reach) -> bool {
+    reach.iter().zip(farthest).fold(true, |is_within, (reach, farthest)| is_within & (reach < farthest))
 }
 
 /// The bounds of every fourth vertex.
@@ -163,7 +180,7 @@ impl ExtentLanes {
     };
 
     /// The bounds in the directions of [`Farthest`].
-    fn farthest(&self) -> [f64; 10] {
+    fn farthest(&self) -> Reach {
         let most = |v: &[f64; LANES]| v.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let [low, high] = [self.low.map(|v| most(&v.map(|v| -v))), self.high.map(|v| most(&v))];
         let [plus, minus] = [self.plus, self.minus].map(|lanes| lanes.map(|v| most(&v)));
@@ -253,8 +270,11 @@ pub fn turned_extents(
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use glam::DQuat;
+
+    use super::*;
+    use crate::limits::{Budget, Limits};
+    use crate::scene::position_boxes::PositionBoxes;
 
     #[test]
     fn blocks_that_are_left_out_change_no_bound() {
@@ -263,8 +283,8 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 8) as f32 / (1 << 24) as f32 - 0.5
         };
-        let mut left_out = 0;
-        for count in [1, 2, 3, 5, 63, 64, 65, 1000, 40_000] {
+        let mut left_out = [0; 2];
+        for count in [1, 2, 3, 5, 63, 64, 65, 1000, 40_000, 400_000] {
             // A walk: neighbours in the list are near each other, as those of a mesh.
             let mut at = [0.0_f32; 3];
             let positions: Vec<[f32; 3]> = (0..count)
@@ -276,7 +296,8 @@ mod tests {
             let turn = DQuat::from_xyzw(random().into(), random().into(), random().into(), 1.0).normalize();
             let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| turn * axis);
             let slopes = DVec2::new(0.3, 2.0);
-            let all = Extents::new(&positions, axes, slopes);
+            let boxes = PositionBoxes::of(&positions, &mut Budget::new(&Limits::default())).unwrap();
+            let all = Extents::new(BoxedPositions { positions: &positions, boxes: &boxes }, axes, slopes);
             let along = |axis: DVec3, p: &[f32; 3]| {
                 let [x, y, z] = p.map(f64::from);
                 (axis.x * x + axis.y * y) + axis.z * z
@@ -291,9 +312,14 @@ mod tests {
                 assert_eq!(all.minus[k], most(&|p| slopes[k] * along(axes[2], p) - along(axes[k], p)));
             }
             let farthest = Farthest::new(axes, slopes);
-            let bounds = farthest.lanes_of(&positions).farthest();
-            left_out += positions.chunks(BLOCK).filter(|block| farthest.is_within(box_of(block), &bounds)).count();
+            let blocks = || positions.chunks(BLOCK).zip(&boxes.blocks);
+            let bounds = farthest.lanes_of(blocks(), &[f64::NEG_INFINITY; WAYS]).farthest();
+            assert_eq!(bounds, farthest.lanes_of(blocks(), &bounds).farthest());
+            let count = |boxes: &[[[f32; 3]; 2]]| {
+                boxes.iter().filter(|around| is_within(&farthest.reach(around), &bounds)).count()
+            };
+            left_out = [left_out[0] + count(&boxes.blocks), left_out[1] + count(&boxes.groups)];
         }
-        assert!(left_out > 400, "{left_out}");
+        assert!(left_out[0] > 400 && left_out[1] > 2, "{left_out:?}");
     }
 }

@@ -9,14 +9,17 @@ pub mod camera;
 mod extents;
 mod ground;
 mod material_groups;
+mod position_boxes;
 
 pub use border::{LINE_PX, Thickness, point_width};
 pub use ground::{GROUND_HEIGHT, GROUND_REACH, GroundPlane};
 pub use material_groups::{Fill, MaterialGroups, barycentric_wire};
+pub use position_boxes::PositionBoxes;
 
 use border::{border, outline_thickness};
 use camera::Camera;
 use material_groups::GROUP_BYTES;
+use position_boxes::BoxedPositions;
 
 use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
@@ -51,12 +54,15 @@ pub enum SceneError {
 impl<'m, 's> Scene<'m, 's> {
     /// Groups the mesh's materials by style and places the camera.
     pub fn new(mesh: &'m Mesh, spec: &'s Spec, budget: &mut Budget) -> Result<Self, SceneError> {
-        Self::framed_by(&mesh.positions, mesh, spec, budget)
+        let boxes = PositionBoxes::of(&mesh.positions, budget)?;
+        Self::framed_by(None, &boxes, mesh, spec, budget)
     }
 
-    /// As [`Scene::new`], but the camera is fitted to these positions.
+    /// As [`Scene::new`], but the camera is fitted to the positions in `framing`, if there are such. `boxes` are those of
+    /// the mesh's positions.
     pub fn framed_by(
-        framing: &[[f32; 3]],
+        framing: Option<&[[f32; 3]]>,
+        boxes: &PositionBoxes,
         mesh: &'m Mesh,
         spec: &'s Spec,
         budget: &mut Budget,
@@ -67,8 +73,12 @@ impl<'m, 's> Scene<'m, 's> {
         budget.spend("materials", mesh.materials.len() as u64, GROUP_BYTES)?;
         let mut groups = MaterialGroups::new(mesh, spec);
         let size_px = [spec.image.width_px, spec.image.height_px];
+        let of_framing = framing.map(|positions| PositionBoxes::of(positions, budget)).transpose()?;
+        let all = BoxedPositions { positions: &mesh.positions, boxes };
+        let framing = framing.zip(of_framing.as_ref());
+        let framing = framing.map_or(all, |(positions, boxes)| BoxedPositions { positions, boxes });
         let place = |groups: &MaterialGroups<'_>| {
-            Camera::place(&spec.camera, mesh, framing, size_px, border(mesh, groups, spec))
+            Camera::place(&spec.camera, mesh, [framing, all], size_px, border(mesh, groups, spec))
         };
         let mut camera = place(&groups);
         // From below the picture is the one without a ground, to the byte.

@@ -11,7 +11,7 @@ use meshsnap_render::image::{DEFAULT_EFFORT, Image, ImageFormat};
 use meshsnap_render::import::Bundle;
 use meshsnap_render::limits::{Budget, Deadline, Limits};
 use meshsnap_render::mesh::Mesh;
-use meshsnap_render::plan::{self, DrawPlan};
+use meshsnap_render::plan::{self, DrawPlan, Prepared};
 use meshsnap_render::request::{self, Rules};
 use meshsnap_render::scene::Scene;
 use meshsnap_render::spec::{BackendChoice, Spec};
@@ -53,11 +53,17 @@ pub fn measure(file: &MeshFile, threads: usize, rounds: usize) -> Vec<Row> {
     let specs: Vec<Spec> = LOOKS.iter().map(|(_, keys)| spec(keys)).collect();
     let mut cpu = CpuRenderer::new(threads);
     let images: Vec<Image> = specs.iter().map(|spec| draw(&mut cpu, &plan(&mesh, spec)).unwrap()).collect();
+    let boxes = Prepared::default().position_boxes(&mesh, &mut Budget::new(&limits())).unwrap();
     let mut reference = Reference::new();
     let mut least = Least::default();
     for _ in 0..rounds {
         least.time("reference", || reference.run());
         least.time("parse", || import(&bundle));
+        // A camera for a mesh of which nothing is known, and for one that was drawn before.
+        least.time("frame", || Scene::new(&mesh, &specs[0], &mut Budget::new(&limits())).unwrap().camera);
+        least.time("frame again", || {
+            Scene::framed_by(None, &boxes, &mesh, &specs[0], &mut Budget::new(&limits())).unwrap().camera
+        });
         for ((look, _), (spec, image)) in LOOKS.iter().zip(specs.iter().zip(&images)) {
             let plan = least.time(&format!("plan {look}"), || plan(&mesh, spec));
             least.time(&format!("render {look}"), || draw(&mut cpu, &plan).unwrap());

@@ -40,8 +40,10 @@ fn draw(mesh: &Mesh, keys: &[(&str, &str)]) -> Image {
     let always = [("view", "front"), ("size", "64"), ("background", "transparent"), ("outline.unit", "px")];
     let spec = scenes::spec(&[&always, keys].concat());
     let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
-    let framing = plan::framing(mesh, &spec, &Prepared::default(), &mut budget, &deadline).unwrap();
-    let scene = Scene::framed_by(framing.as_deref().unwrap_or(&mesh.positions), mesh, &spec, &mut budget).unwrap();
+    let prepared = Prepared::default();
+    let framing = plan::framing(mesh, &spec, &prepared, &mut budget, &deadline).unwrap();
+    let boxes = prepared.position_boxes(mesh, &mut budget).unwrap();
+    let scene = Scene::framed_by(framing.as_deref(), &boxes, mesh, &spec, &mut budget).unwrap();
     let plan = plan::build(&scene, &mut budget, &deadline).unwrap();
     CpuRenderer::new(1).draw(&plan, &deadline).unwrap()
 }
