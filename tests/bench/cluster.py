@@ -5,7 +5,7 @@ is alone draws.
 
     tests/bench/cluster.py kills        # a server is killed every 2 s for 60 s, NATS twice: 2,000 jobs on 4 servers
     tests/bench/cluster.py partition    # servers in namespaces of their own are cut off for 5 to 40 s (needs root)
-    tests/bench/cluster.py slow-store   # a bucket whose answers take 2 s, and one of twenty of which is an error
+    tests/bench/cluster.py slow-store   # a bucket whose connections take 2 s, and one of twenty of which breaks
     tests/bench/cluster.py duplicates   # 1,000 clients want 50 pictures
     tests/bench/cluster.py scaling      # 1, 2 and 4 servers, each with half a core; and what the queue costs per job.
                                         # With --share .2, four of them leave 2 cores something for NATS and the client
@@ -320,7 +320,7 @@ def introduction(port):
 
 
 def slow_store(options):
-    """A bucket behind a proxy that waits 2 s before one answer in ten and breaks one connection in twenty."""
+    """A bucket behind a proxy that waits 2 s on each connection and breaks one in twenty."""
     host, port = bucket()
     trouble = {"on": False}
 
@@ -329,7 +329,7 @@ def slow_store(options):
             if trouble["on"] and random.random() < 0.05:
                 return
             if trouble["on"]:
-                time.sleep(2 * random.random())
+                time.sleep(2)
             with socket.create_connection((host, port)) as server:
                 def copy(source, target):
                     try:

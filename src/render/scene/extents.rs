@@ -1,7 +1,7 @@
 //! The bounds of a mesh as a camera sees it, to which the camera is fitted: the least and the largest
 //! coordinates along the camera's axes, and how far vertices reach towards the four sides of the view
-//! pyramid. For a single view, vertices whose boxes (`position_boxes`) show that they cannot change the result are left out. For a
-//! turntable, the bounds are those of a whole turn.
+//! pyramid. For a single view, vertices are left out whose boxes (`position_boxes`) show that they cannot
+//! change the result. For a turntable, the bounds are those of a whole turn.
 
 use glam::{DVec2, DVec3};
 

@@ -40,7 +40,7 @@ impl PositionBoxes {
     /// The boxes around positions.
     pub fn of(positions: &[[f32; 3]], budget: &mut Budget) -> Result<Self, LimitExceeded> {
         let count = positions.len().div_ceil(BLOCK) + positions.len().div_ceil(GROUP);
-        // Twice: by thread, and in one list.
+        // Twice: by thread, and in one list. The room of the first is enough for the lists of a search (`extents`).
         budget.spend("boxes of positions", count as u64, 2 * size_of::<Corners>() as u64)?;
         let boxes = |part: &[[f32; 3]]| part.chunks(BLOCK).map(box_of).collect::<Vec<_>>();
         let blocks = map(positions.chunks(CHUNK * GROUP).collect(), boxes).concat();

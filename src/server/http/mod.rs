@@ -119,7 +119,8 @@ pub fn serve(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     served
 }
 
-/// Futures of the engines' clients are boxed here: they are large, and a server that is alone needs no stack for them.
+/// Serves, on a runtime. The futures of the clients of the shared store and queue are boxed: they are large, and a server
+/// that is alone needs no stack for them.
 async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), ServeError> {
     let keys = Keys::open(&config.api_keys, config.api_keys_file.as_deref())?;
     let listen_error = |error| ServeError::Listen { listen: config.listen.clone(), error };
@@ -183,7 +184,7 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     Ok(())
 }
 
-/// The shared store and the shared queue, once they answer. None: there is to be none.
+/// The shared store and the shared queue that are configured, once they answer. None: there is to be none.
 async fn open_shared(config: &Config) -> Result<(Option<Shared>, Option<SharedQueue>), ServeError> {
     let queue = config.shared_queue.as_deref().map(shared_queue::Address::read).transpose();
     let queue = queue.map_err(shared_queue::OpenError::from)?;
@@ -196,6 +197,7 @@ async fn open_shared(config: &Config) -> Result<(Option<Shared>, Option<SharedQu
     connect(config, address, queue).boxed_local().await
 }
 
+/// The shared store, and the shared queue if there is to be one, once they answer.
 async fn connect(
     config: &Config,
     address: &str,

@@ -1,6 +1,6 @@
-//! The news that the daemons of a service tell each other: that they are there, and whether they have a GPU; what they have admitted
-//! of each client's share (`crate::rates`); and which meshes have kept their workers busy. A daemon that starts, or that was
-//! cut off, asks one of the others what it knows.
+//! The news that the daemons of a service tell each other: that they are there, and whether they have a GPU; what they
+//! have admitted of each client's share (`crate::rates`); and which meshes have kept their workers busy. A daemon that
+//! starts, or that was cut off, asks one of the others what it knows.
 //!
 //! Nothing of it is kept anywhere but in the daemons. What is missed makes a limit less exact, and nothing else.
 
