@@ -46,6 +46,8 @@ pub enum SkipKind {
     Margin,
     /// The light that hollows go without.
     Occlusion,
+    /// Faces, and edges of outlines, that a closed surface hides.
+    UnseenFaces,
 }
 
 impl SkipKind {
@@ -66,6 +68,7 @@ impl SkipKind {
         Self::Clipping,
         Self::Margin,
         Self::Occlusion,
+        Self::UnseenFaces,
     ];
 }
 
@@ -87,6 +90,7 @@ impl fmt::Display for SkipKind {
             Self::Clipping => "clipping",
             Self::Margin => "samples beyond the picture",
             Self::Occlusion => "occlusion",
+            Self::UnseenFaces => "unseen faces of outlines",
         })
     }
 }
@@ -106,11 +110,12 @@ impl<'k> Skips<'k> {
     }
 
     /// True if `kind` is left out: the scene does not need it, and it need not be kept. If so, the
-    /// skip is noted.
+    /// skip is noted once.
     pub fn skip(&mut self, kind: SkipKind, is_unneeded: bool, why: &'static str) -> bool {
         let skips = is_unneeded && !self.keep.contains(&kind);
-        if skips {
-            self.done.push(Skip { kind, why });
+        let skip = Skip { kind, why };
+        if skips && !self.done.contains(&skip) {
+            self.done.push(skip);
         }
         skips
     }

@@ -12,7 +12,7 @@ use crate::mesh::topology::Orientation;
 use crate::mesh::vector::{cross, dot};
 use crate::plan::cut_outs::MaskedFaces;
 use crate::plan::{Edge, FaceSide};
-use crate::scene::{Fill, MaterialGroups};
+use crate::scene::{Fill, MaterialGroups, barycentric_wire};
 use crate::spec::{Cull, Layers};
 
 /// Finds the faces that decide whether an edge is a silhouette edge. Of an edge's faces only those
@@ -120,6 +120,16 @@ fn outermost(mesh: &Mesh, ends: [u32; 2], faces: &[u32]) -> Option<[u32; 2]> {
 fn least_axis(v: [f64; 3]) -> [f64; 3] {
     let least = (0..3).min_by(|&a, &b| v[a].abs().total_cmp(&v[b].abs()));
     std::array::from_fn(|k| if Some(k) == least { 1.0 } else { 0.0 })
+}
+
+/// By material, true if its faces hide what is behind them.
+pub fn hiding_materials(groups: &MaterialGroups<'_>) -> Vec<bool> {
+    let hides = |(layers, fill): (&&Layers, &Fill)| match fill {
+        Fill::Opaque => true,
+        Fill::Transparent => false,
+        Fill::None => groups.needs_hiding_surface() && barycentric_wire(layers).is_none(),
+    };
+    groups.by_material.iter().zip(groups.fills()).map(hides).collect()
 }
 
 /// True if a closed surface of these materials hides its inside.

@@ -7,11 +7,11 @@
 use crate::mesh::edges::EdgeList;
 use crate::plan::PlanError;
 use crate::plan::context::PlanContext;
-use crate::plan::edges::silhouettes::Silhouettes;
+use crate::plan::edges::silhouettes::{Silhouettes, hiding_materials};
 use crate::plan::outline::chains::{ChainLength, remove_short};
 use crate::plan::outline::screen_edges::{OutlineView, ScreenEdge};
 use crate::plan::outline::silhouette_edges::{ScreenMesh, SilhouetteEdge};
-use crate::plan::outline::visible_parts::{VisiblePart, hiding_materials, visible_parts};
+use crate::plan::outline::visible_parts::{VisiblePart, visible_parts};
 use crate::scene::{Scene, Thickness};
 use crate::spec::{Outline, OutlineMethod};
 

@@ -6,14 +6,15 @@ use std::sync::Arc;
 use crate::limits::Stopped;
 use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, MeshEdge};
-use crate::mesh::vector::is_in_order;
+use crate::mesh::vector::{cross, dot, is_in_order, sub};
 use crate::parallel;
 use crate::plan::context::PlanContext;
 use crate::plan::edges::face_runs::{FACES, FaceRuns};
 use crate::plan::edges::select::{map, select_by};
-use crate::plan::edges::silhouettes::Silhouettes;
+use crate::plan::edges::silhouettes::{Silhouettes, hiding_materials, unseen_side};
 use crate::plan::edges::view_of_runs::RunView;
-use crate::plan::{Edge, PlanError, Projection, Projector};
+use crate::plan::skips::SkipKind;
+use crate::plan::{Edge, FaceSide, PlanError, Projection, Projector};
 use crate::scene::{Fill, MaterialGroups, Scene, Thickness};
 use crate::spec::Cull;
 
@@ -23,6 +24,9 @@ const RUNS: usize = 128;
 /// Outlines are cut at a plane that is farther than the near plane by this share of its distance: no corner of theirs is
 /// behind the near plane for being rounded to f32.
 const NEAR_MARGIN: f64 = 1e-5;
+
+/// A volume, as a share of the product of its sides, that may be nothing but rounding.
+const FLAT: f64 = 1e-12;
 
 /// An edge beside which an outline is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Zeroable)]
@@ -38,6 +42,8 @@ pub struct SilhouetteEdge {
     pub material: u32,
     /// Its number in the mesh's list of edges.
     pub index: u32,
+    /// True if the surface that it belongs to surely hides it.
+    pub is_hidden: bool,
 }
 
 /// A mesh as one view shows it.
@@ -58,6 +64,8 @@ pub struct ScreenMesh<'a> {
     open_runs: Vec<u32>,
     /// By material: the side that is culled.
     culls: Vec<Cull>,
+    /// The side that no face shows, because the mesh is closed and seen from outside.
+    unseen: Option<FaceSide>,
 }
 
 impl<'a> ScreenMesh<'a> {
@@ -93,7 +101,8 @@ impl<'a> ScreenMesh<'a> {
         let mut open_runs = Vec::with_capacity(runs.runs.len());
         open_runs.extend((0..runs.runs.len() as u32).filter(is_open));
         let culls = (0..groups.material_count()).map(|m| cull(groups, m)).collect();
-        Ok(Self { mesh, projection, projector, runs, run_view, facing: facings, open_runs, culls })
+        let unseen = unseen(scene, cx)?;
+        Ok(Self { mesh, projection, projector, runs, run_view, facing: facings, open_runs, culls, unseen })
     }
 
     /// X, Y, Z and W of a position.
@@ -138,8 +147,34 @@ impl<'a> ScreenMesh<'a> {
     fn each_side(&self, index: u32, edge: &Edge, outlines: &[Option<Thickness>], each: &mut dyn FnMut(SilhouetteEdge)) {
         let faces = self.drawn(edge.faces);
         let Some(material) = self.material(faces, outlines) else { return };
+        let is_hidden = self.is_concave(edge);
         for &free in self.free_sides(edge.vertices, faces) {
-            each(SilhouetteEdge { vertices: edge.vertices, faces, free, material, index });
+            each(SilhouetteEdge { vertices: edge.vertices, faces, free, material, index, is_hidden });
+        }
+    }
+
+    /// True for an edge of a closed surface that turns inwards: the surface hides it. Outside of the surface is, near
+    /// such an edge, only what lies before both of its faces. The viewer lies behind one of them, for a silhouette edge
+    /// has one face that shows its back. So the way to the viewer begins inside, and leads out through another face.
+    fn is_concave(&self, edge: &Edge) -> bool {
+        let (Some(unseen), [first, second]) = (self.unseen, edge.faces) else { return false };
+        let corners = |face: u32| self.mesh.triangles.get(face as usize);
+        let (Some(first), Some(second)) = (corners(first), corners(second)) else { return false };
+        let Some(other) = second.iter().find(|v| !edge.vertices.contains(v)) else { return false };
+        let at = |v: u32| self.mesh.positions[v as usize].map(f64::from);
+        let [a, b, c] = first.map(at);
+        let (p, q, r) = (sub(b, a), sub(c, a), sub(at(*other), a));
+        let height = dot(cross(p, q), r) * if unseen == FaceSide::Back { 1.0 } else { -1.0 };
+        height > FLAT * (dot(p, p) * dot(q, q) * dot(r, r)).sqrt()
+    }
+
+    /// True for a face that shows the side that is never seen: other faces hide what it hides.
+    pub fn is_unseen(&self, face: u32) -> bool {
+        let facing = self.facing.get(face as usize).copied().unwrap_or(0);
+        match self.unseen {
+            Some(FaceSide::Back) => facing > 0,
+            Some(FaceSide::Front) => facing < 0,
+            None => false,
         }
     }
 
@@ -197,6 +232,19 @@ impl<'a> ScreenMesh<'a> {
         let runs_along = (0..3).any(|k| corners[k] == from && corners[(k + 1) % 3] == to);
         if runs_along { facing } else { -facing }
     }
+}
+
+/// The side that no face of a scene's mesh shows, where that is known.
+fn unseen(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Option<FaceSide>, PlanError> {
+    // Only where the eye is surely outside of the mesh is the inside of its faces never seen.
+    if !scene.camera.contains_mesh || hiding_materials(&scene.groups).contains(&false) {
+        return Ok(None);
+    }
+    let (_, orientation) = cx.edges_and_orientation(scene.mesh)?;
+    let unseen = orientation.and_then(|orientation| unseen_side(&scene.groups, orientation));
+    let why = "the mesh is closed, and the camera is outside";
+    let is_skipped = cx.skips.skip(SkipKind::UnseenFaces, unseen.is_some(), why);
+    Ok(unseen.filter(|_| is_skipped))
 }
 
 /// The side of a material that is culled, if the material is filled.

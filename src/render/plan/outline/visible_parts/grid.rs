@@ -129,7 +129,7 @@ fn near_faces(
     let (mesh, near_w) = (view.view.mesh, view.view.near_w());
     let is_near = |face: usize| {
         let hides = hides.get(mesh.triangle_materials[face] as usize).copied().unwrap_or(true);
-        if !hides || matches!(view.view.shown(face as u32), None | Some(0)) {
+        if !hides || matches!(view.view.shown(face as u32), None | Some(0)) || view.view.is_unseen(face as u32) {
             return false;
         }
         let [a, b, c] = mesh.triangles[face];

@@ -24,8 +24,7 @@ use crate::plan::outline::outer_side::OuterSide;
 use crate::plan::outline::screen_edges::{OutlineView, ScreenEdge};
 use crate::plan::outline::silhouette_edges::SilhouetteEdge;
 use crate::plan::{PX, PlanError};
-use crate::scene::{Fill, MaterialGroups, barycentric_wire};
-use crate::spec::{Layers, OutlineMethod};
+use crate::spec::OutlineMethod;
 
 /// Parts of an edge that are told apart. What follows the last of them counts as visible.
 const PARTS_MAX: usize = 16;
@@ -71,16 +70,6 @@ pub struct VisiblePart {
     pub is_border: bool,
 }
 
-/// By material, true if its faces hide what is behind them.
-pub fn hiding_materials(groups: &MaterialGroups<'_>) -> Vec<bool> {
-    let hides = |(layers, fill): (&&Layers, &Fill)| match fill {
-        Fill::Opaque => true,
-        Fill::Transparent => false,
-        Fill::None => groups.needs_hiding_surface() && barycentric_wire(layers).is_none(),
-    };
-    groups.by_material.iter().zip(groups.fills()).map(hides).collect()
-}
-
 /// The visible parts of all edges, in their order. `hides` says which materials hide.
 pub fn visible_parts(
     view: &OutlineView<'_>,
@@ -98,7 +87,7 @@ pub fn visible_parts(
         if i % (CHECK_EVERY >> 6) == 0 {
             cx.deadline.check()?;
         }
-        if place.may_show {
+        if place.may_show && !edges[i].is_hidden {
             marks.line(&place.ends.map(|[x, y, ..]| [x, y]));
             (0..samples(place)).for_each(|k| search.beside(i, k).into_iter().for_each(|at| marks.point(at)));
         }
@@ -156,7 +145,7 @@ impl Search<'_> {
         self.deadline.check()?;
         let mut found = Vec::with_capacity(range.len());
         let mut hidden = Vec::new();
-        for i in range.filter(|&i| self.places[i].may_show) {
+        for i in range.filter(|&i| self.places[i].may_show && !self.edges[i].is_hidden) {
             let Some(grid) = &self.grid else {
                 found.push(VisiblePart { edge: i as u32, range: [0.0, 1.0], shown: 1.0, is_border: true });
                 continue;

@@ -2,6 +2,14 @@
 
 use super::grid::ScreenFace;
 use super::*;
+use crate::import::{Bundle, import};
+use crate::limits::{Budget, Limits};
+use crate::plan::edges::silhouettes::hiding_materials;
+use crate::plan::outline::silhouette_edges::ScreenMesh;
+use crate::plan::skips::SkipKind;
+use crate::request::{self, Rules};
+use crate::scene::{Scene, Thickness};
+use crate::spec::BackendChoice;
 
 fn visible(hidden: &[[f64; 2]], length_px: f64) -> Vec<[f64; 2]> {
     let mut found = Vec::new();
@@ -71,4 +79,71 @@ fn two_faces_that_share_a_side_leave_nothing_between_them() {
     let [a, b, c, d] = [[-10.0, -10.0], [1010.0, 0.0], [1010.0, 10.0], [-10.0, 0.0]].map(|[x, y]| [x, y, 0.9]);
     let faces = [[a, b, d], [b, c, d]].map(|corners| ScreenFace { corners, vertices: [7, 8, 9] });
     assert!(faces.iter().all(|face| hidden_range(face, &edge(), [1, 2], 1e-6) == Some([0.0, 1.0])));
+}
+
+/// A closed ball with bumps, of `n` bands; inside out if the faces are turned.
+fn bumpy_ball(n: usize, is_turned: bool) -> String {
+    use std::fmt::Write;
+    let mut obj = String::new();
+    let columns = 2 * n;
+    for (i, j) in (0..=n).flat_map(|i| (0..if i % n == 0 { 1 } else { columns }).map(move |j| (i, j))) {
+        let [a, b] = [(i, n), (2 * j, columns)].map(|(at, of)| std::f64::consts::PI * at as f64 / of as f64);
+        let r = 1.0 + 0.15 * (7.0 * a).sin() * (5.0 * b).sin() + 0.01 * f64::from((i * 7 + j * 5) as u32 % 5);
+        writeln!(obj, "v {} {} {}", r * a.sin() * b.cos(), r * a.cos(), r * a.sin() * b.sin()).unwrap();
+    }
+    let vertex = |i: usize, j: usize| match i {
+        0 => 1,
+        _ if i == n => 2 + (n - 1) * columns,
+        _ => 2 + (i - 1) * columns + j % columns,
+    };
+    for (i, j) in (0..n).flat_map(|i| (0..columns).map(move |j| (i, j))) {
+        let [a, b, c, d] = [vertex(i, j), vertex(i, j + 1), vertex(i + 1, j + 1), vertex(i + 1, j)];
+        for [p, q, r] in [[a, b, c], [a, c, d]].into_iter().filter(|[p, q, r]| p != q && q != r && r != p) {
+            let [q, r] = if is_turned { [r, q] } else { [q, r] };
+            writeln!(obj, "f {p} {q} {r}").unwrap();
+        }
+    }
+    obj
+}
+
+/// What the search finds of a closed surface, with all of its faces and edges.
+#[test]
+fn what_a_closed_surface_hides_changes_no_visible_part() {
+    let limits = Limits::default();
+    let deadline = Deadline::default();
+    let (mut hidden, mut parts) = (0, 0);
+    for (is_turned, view, projection) in [
+        (false, "iso", "perspective"),
+        (false, "front", "orthographic"),
+        (true, "top", "perspective"),
+        (true, "iso", "orthographic"),
+    ] {
+        let mut budget = Budget::new(&limits);
+        let bundle = Bundle::of_one(bumpy_ball(40, is_turned).into_bytes());
+        let mesh = import(&bundle, None, &limits, &mut budget, &deadline).unwrap().0;
+        let keys = [("style", "outline"), ("view", view), ("camera.projection", projection)];
+        let keys: Vec<(String, String)> = keys.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
+        let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
+        let spec = request::read(None, &keys, &rules).unwrap();
+        let scene = Scene::new(&mesh, &spec, &mut budget).unwrap();
+        let mut find = |keep: &[SkipKind]| {
+            let mut cx = PlanContext::new(&mut budget, &deadline, keep);
+            let (list, silhouettes) = cx.silhouettes(&scene).unwrap();
+            let screen = ScreenMesh::new(&scene, &mut cx).unwrap();
+            let outlines = [Some(Thickness::Px(3.0))];
+            let edges = screen.silhouette_edges(&outlines, &list, &silhouettes, &mut cx).unwrap();
+            let view = OutlineView::new(&screen, &outlines, scene.size_px(), 0);
+            let places = view.screen_edges(&edges, &mut cx).unwrap();
+            let hides = hiding_materials(&scene.groups);
+            let parts = visible_parts(&view, &edges, &places, &hides, OutlineMethod::Hull, &mut cx).unwrap();
+            (edges.iter().filter(|edge| edge.is_hidden).count(), edges.len(), parts)
+        };
+        let (of_all, count, want) = find(&[SkipKind::UnseenFaces]);
+        let (left_out, _, found) = find(&[]);
+        assert_eq!(of_all, 0);
+        assert!(found == want, "{view} {projection}: {} parts, not {}", found.len(), want.len());
+        assert!(5 * left_out > count && 5 * left_out < 4 * count, "{left_out} of {count}");
+        (hidden, parts) = (hidden + left_out, parts + found.len());
+    }
+    assert!(hidden > 400 && parts > 400, "{hidden}, {parts}");
 }
