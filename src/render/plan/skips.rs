@@ -46,7 +46,7 @@ pub enum SkipKind {
     Margin,
     /// The light that hollows go without.
     Occlusion,
-    /// Faces, and edges of outlines, that a closed surface hides.
+    /// Faces of a closed mesh that show their inside, where faces are looked for that hide an outline.
     UnseenFaces,
 }
 

@@ -66,6 +66,8 @@ pub struct ScreenMesh<'a> {
     culls: Vec<Cull>,
     /// The side that no face shows, because the mesh is closed and seen from outside.
     unseen: Option<FaceSide>,
+    /// True if faces that show this side are left out where hiding faces are looked for.
+    skips_unseen: bool,
 }
 
 impl<'a> ScreenMesh<'a> {
@@ -102,7 +104,20 @@ impl<'a> ScreenMesh<'a> {
         open_runs.extend((0..runs.runs.len() as u32).filter(is_open));
         let culls = (0..groups.material_count()).map(|m| cull(groups, m)).collect();
         let unseen = unseen(scene, cx)?;
-        Ok(Self { mesh, projection, projector, runs, run_view, facing: facings, open_runs, culls, unseen })
+        let why = "the mesh is closed, and the camera is outside";
+        let skips_unseen = cx.skips.skip(SkipKind::UnseenFaces, unseen.is_some(), why);
+        Ok(Self {
+            mesh,
+            projection,
+            projector,
+            runs,
+            run_view,
+            facing: facings,
+            open_runs,
+            culls,
+            unseen,
+            skips_unseen,
+        })
     }
 
     /// X, Y, Z and W of a position.
@@ -171,7 +186,7 @@ impl<'a> ScreenMesh<'a> {
     /// True for a face that shows the side that is never seen: other faces hide what it hides.
     pub fn is_unseen(&self, face: u32) -> bool {
         let facing = self.facing.get(face as usize).copied().unwrap_or(0);
-        match self.unseen {
+        match self.unseen.filter(|_| self.skips_unseen) {
             Some(FaceSide::Back) => facing > 0,
             Some(FaceSide::Front) => facing < 0,
             None => false,
@@ -241,10 +256,7 @@ fn unseen(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Option<Face
         return Ok(None);
     }
     let (_, orientation) = cx.edges_and_orientation(scene.mesh)?;
-    let unseen = orientation.and_then(|orientation| unseen_side(&scene.groups, orientation));
-    let why = "the mesh is closed, and the camera is outside";
-    let is_skipped = cx.skips.skip(SkipKind::UnseenFaces, unseen.is_some(), why);
-    Ok(unseen.filter(|_| is_skipped))
+    Ok(orientation.and_then(|orientation| unseen_side(&scene.groups, orientation)))
 }
 
 /// The side of a material that is culled, if the material is filled.
