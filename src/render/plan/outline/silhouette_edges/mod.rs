@@ -162,17 +162,22 @@ impl<'a> ScreenMesh<'a> {
     fn each_side(&self, index: u32, edge: &Edge, outlines: &[Option<Thickness>], each: &mut dyn FnMut(SilhouetteEdge)) {
         let faces = self.drawn(edge.faces);
         let Some(material) = self.material(faces, outlines) else { return };
-        let is_hidden = self.is_concave(edge);
         for &free in self.free_sides(edge.vertices, faces) {
+            let is_hidden = self.is_concave(edge);
             each(SilhouetteEdge { vertices: edge.vertices, faces, free, material, index, is_hidden });
         }
     }
 
     /// True for an edge of a closed surface that turns inwards: the surface hides it. Outside of the surface is, near
-    /// such an edge, only what lies before both of its faces. The viewer lies behind one of them, for a silhouette edge
-    /// has one face that shows its back. So the way to the viewer begins inside, and leads out through another face.
+    /// such an edge, only what lies before both of its faces. The viewer lies behind the one that shows its back. So the
+    /// way to the viewer begins inside, and leads out through another face. Of a face that is seen edge on, neither is
+    /// known.
     fn is_concave(&self, edge: &Edge) -> bool {
         let (Some(unseen), [first, second]) = (self.unseen, edge.faces) else { return false };
+        let facing = |face: u32| self.facing.get(face as usize).copied().unwrap_or(0);
+        if facing(first) * facing(second) >= 0 {
+            return false;
+        }
         let corners = |face: u32| self.mesh.triangles.get(face as usize);
         let (Some(first), Some(second)) = (corners(first), corners(second)) else { return false };
         let Some(other) = second.iter().find(|v| !edge.vertices.contains(v)) else { return false };
