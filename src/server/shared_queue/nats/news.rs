@@ -100,6 +100,8 @@ impl News {
                 }
             };
             tokio::select! {
+                // An answer contains all news that came before the question.
+                biased;
                 told = self.told.next() => return Some(Heard::Told(told?.payload)),
                 asked = question => {
                     let async_nats::Message { payload, reply, .. } = asked?;
