@@ -11,7 +11,7 @@ use axum::routing::{MethodRouter, get, post};
 use super::error::ApiError;
 use super::middleware::{auth, cors, observe, rates, site};
 use super::resources::verdicts::{check, diff};
-use super::resources::{events, front_page, health, jobs, meshes, metrics, pictures, render, schema};
+use super::resources::{events, health, jobs, meshes, metrics, pages, pictures, render, schema, status};
 use super::state::AppState;
 
 /// The router of the whole interface.
@@ -24,7 +24,8 @@ pub fn router(state: &Arc<AppState>) -> Router {
         .route_layer(from_fn_with_state(state.clone(), auth::check))
         .route_layer(from_fn_with_state(state.clone(), site::check));
     let routes = Router::new()
-        .route("/", get(front_page::get))
+        .route("/", get(pages::front))
+        .route("/status", get(pages::status))
         .route("/healthz", get(health::healthz))
         .route("/readyz", get(health::readyz))
         .route("/version", get(health::version))
@@ -49,7 +50,7 @@ pub fn router(state: &Arc<AppState>) -> Router {
 }
 
 /// The routes that need an API key where keys are configured.
-fn protected_routes() -> [(&'static str, MethodRouter<Arc<AppState>>); 12] {
+fn protected_routes() -> [(&'static str, MethodRouter<Arc<AppState>>); 13] {
     [
         ("/v1/render", post(render::post)),
         ("/v1/check", post(check::post)),
@@ -64,6 +65,7 @@ fn protected_routes() -> [(&'static str, MethodRouter<Arc<AppState>>); 12] {
         ("/v1/jobs/{id}/events", get(events::get)),
         (schema::PATH, get(schema::get)),
         ("/v1/capabilities", get(capabilities)),
+        ("/v1/status", get(status::get)),
     ]
 }
 

@@ -3,8 +3,9 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use super::error::ApiError;
 use super::event_streams::EventStreams;
 use super::hear_of_ends::Settlements;
 use super::shared_jobs::service::SharedJobs;
@@ -83,6 +84,8 @@ pub struct AppState {
     pub rates: Rates,
     /// The API keys. If there are none, no request needs one.
     pub keys: Keys,
+    /// The start of the server.
+    pub began: Instant,
     leaving: AtomicBool,
     draining: AtomicBool,
 }
@@ -162,6 +165,7 @@ impl AppState {
                 config.shared_queue.is_some(),
             ),
             keys,
+            began: Instant::now(),
             leaving: AtomicBool::new(false),
             draining: AtomicBool::new(false),
         });
@@ -206,6 +210,7 @@ fn job_settings(config: &Config, memory: &Arc<Memory>) -> JobSettings {
         result_count: to_usize(config.result_count),
         memory: memory.clone(),
         metrics: None,
+        code_of: |failure| ApiError::from(failure).code,
         webhooks: None,
         storage: None,
     }

@@ -79,6 +79,8 @@ pub struct JobSettings {
     pub storage: Option<Storage>,
     /// Hears of waits, stages and ends.
     pub metrics: Option<Arc<Metrics>>,
+    /// Gives the code of a failure.
+    pub code_of: fn(&Failure) -> &'static str,
     /// Hears of the end of each job that has a webhook.
     pub webhooks: Option<OnEnd>,
 }

@@ -338,6 +338,9 @@ impl JobRegistry {
         }
         let Some(metrics) = &self.settings.metrics else { return };
         metrics.ended(job.class.name(), state.name());
+        if let (true, JobState::Failed(failure)) = (job.is_kept, state) {
+            metrics.job_failed((self.settings.code_of)(failure));
+        }
         if let JobState::Done(finished) = state {
             // Waiting has a metric of its own.
             let is_stage = |stage: &str| stage != "queue" && (finished.media != Media::Json || stage == "parse");

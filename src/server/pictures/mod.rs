@@ -173,6 +173,9 @@ impl Pictures {
 }
 
 impl Source {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Hit, Self::Miss, Self::Coalesced, Self::Shared];
+
     /// The word in the header `X-Cache`.
     pub fn name(self) -> &'static str {
         match self {

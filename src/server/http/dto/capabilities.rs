@@ -31,7 +31,7 @@ pub struct CapabilitiesDto {
 
 /// The back-ends that can draw.
 #[derive(Serialize)]
-struct BackendDto {
+pub struct BackendDto {
     default: &'static str,
     choices: Vec<&'static str>,
     gpu: GpuDto,
@@ -106,7 +106,7 @@ impl CapabilitiesDto {
 
 impl BackendDto {
     /// The back-end of requests that name none, and the state of the GPU.
-    fn new(default: BackendChoice, gpu: GpuStatus) -> Self {
+    pub fn new(default: BackendChoice, gpu: GpuStatus) -> Self {
         let GpuStatus { state, info, reason } = gpu;
         let (name, driver, device_type, features) = match info {
             Some(info) => (Some(info.name), Some(info.driver), Some(info.device_type), info.features),

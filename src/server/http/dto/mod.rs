@@ -5,9 +5,11 @@
 
 mod capabilities;
 mod job;
+mod server_status;
 
 pub use capabilities::CapabilitiesDto;
 pub use job::{JobDto, JobOfMeshDto, JobsDto};
+pub use server_status::ServerStatusDto;
 
 use serde::Serialize;
 

@@ -60,6 +60,7 @@ fn wanted(method: &Method, path: &str) -> &'static [Scope] {
     let is_writing = [Method::POST, Method::PUT, Method::DELETE].contains(method);
     match path {
         "/metrics" => &[Scope::Metrics],
+        "/v1/status" => &[Scope::Admin],
         "/v1/capabilities" | "/v1/schema" => &[],
         "/v1/meshes" | "/v1/meshes/{sha256}" if is_writing => &[Scope::Store],
         // Whoever stores meshes asks first whether they are there.

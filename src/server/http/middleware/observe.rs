@@ -9,7 +9,7 @@ use std::time::Instant;
 use axum::body::Body;
 use axum::extract::connect_info::ConnectInfo;
 use axum::extract::{MatchedPath, Request, State};
-use axum::http::{HeaderMap, HeaderName, HeaderValue, Version, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, Version, header};
 use axum::middleware::Next;
 use axum::response::Response;
 use tracing::Instrument as _;
@@ -40,6 +40,7 @@ pub async fn observe(State(state): State<Arc<AppState>>, request: Request, next:
     Trace::of_headers(|name| headers.get(name)?.to_str().ok()).adopt(&span);
     let route = request.extensions().get::<MatchedPath>().map(MatchedPath::as_str);
     traces::describe_request(&span, request.method().as_str(), route);
+    let place = place(request.method(), route);
     let (mut parts, body) = request.into_parts();
     parts.extensions.insert(RequestId(id.as_str().into()));
     let (drainable, body) = DrainableBody::new(body);
@@ -53,13 +54,20 @@ pub async fn observe(State(state): State<Arc<AppState>>, request: Request, next:
     let (status, duration_ms) = (response.status().as_u16(), began.elapsed().as_secs_f64() * 1e3);
     let code = response.extensions().get::<ApiError>().map(|e| (e.code, e.detail.clone()));
     traces::describe_answer(&span, status);
-    state.metrics.answered(status, code.as_ref().map(|(code, _)| *code));
+    state.metrics.answered(&place, status, code.as_ref().map(|(code, _)| *code));
     span.in_scope(|| match code {
         Some((code, detail)) if status >= 500 => tracing::warn!(status, duration_ms, code, detail, "answered"),
         Some((code, detail)) => tracing::info!(status, duration_ms, code, detail, "answered"),
         None => tracing::info!(status, duration_ms, "answered"),
     });
     response
+}
+
+/// The method and the route of a request, without anything that the client has made up.
+fn place(method: &Method, route: Option<&str>) -> String {
+    let known = [Method::GET, Method::HEAD, Method::POST, Method::PUT, Method::DELETE, Method::OPTIONS];
+    let method = known.iter().find(|known| *known == method).map_or("other", Method::as_str);
+    format!("{method} {}", route.unwrap_or("elsewhere"))
 }
 
 /// The id of a request.

@@ -19,7 +19,21 @@ const LOOK_TIME: Duration = Duration::from_secs(2);
 
 /// Everything that is counted.
 pub async fn get(State(state): State<Arc<AppState>>) -> Result<Response, ApiError> {
-    let mut gauges = gauges(&state);
+    let gauges = gauges(&state).await;
+    let text = state.metrics.text(&gauges).map_err(|error| {
+        tracing::error!(%error, "the metrics cannot be written");
+        ApiError::internal()
+    })?;
+    let headers = [
+        (header::CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE)),
+        (header::CACHE_CONTROL, HeaderValue::from_static("no-store")),
+    ];
+    Ok((headers, text).into_response())
+}
+
+/// The gauges at this moment, those of the shared queue too.
+pub async fn gauges(state: &AppState) -> Gauges {
+    let mut gauges = own_gauges(state);
     if let Some(jobs) = &state.shared_jobs
         && let Ok(Some(load)) = tokio::time::timeout(LOOK_TIME, jobs.load()).await
     {
@@ -32,18 +46,10 @@ pub async fn get(State(state): State<Arc<AppState>>) -> Result<Response, ApiErro
         ];
         gauges.shared_oldest_s = load.oldest.as_secs();
     }
-    let text = state.metrics.text(&gauges).map_err(|error| {
-        tracing::error!(%error, "the metrics cannot be written");
-        ApiError::internal()
-    })?;
-    let headers = [
-        (header::CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE)),
-        (header::CACHE_CONTROL, HeaderValue::from_static("no-store")),
-    ];
-    Ok((headers, text).into_response())
+    gauges
 }
 
-fn gauges(state: &AppState) -> Gauges {
+fn own_gauges(state: &AppState) -> Gauges {
     let (jobs, meshes) = (state.jobs.load(), state.meshes.load());
     let (residents, pictures) = (state.residents.load(), state.pictures.load());
     let waits = [jobs.wait, jobs.batch_wait].map(|wait| u64::try_from(wait.as_millis()).unwrap_or(u64::MAX));

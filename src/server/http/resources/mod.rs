@@ -5,16 +5,17 @@
 //! handler parses a mesh or draws: such work goes to the job queue.
 
 pub mod events;
-pub mod front_page;
 pub mod health;
 pub mod jobs;
 pub mod meshes;
 pub mod metrics;
+pub mod pages;
 pub mod pictures;
 pub mod render;
 mod responses;
 mod run;
 pub mod schema;
+pub mod status;
 pub mod verdicts;
 
 use axum::extract::Path;

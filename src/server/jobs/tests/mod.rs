@@ -40,6 +40,7 @@ fn settings() -> JobSettings {
         memory: Memory::unlimited(&[(Account::Uploads, 1 << 20)]),
         storage: None,
         metrics: None,
+        code_of: |_| "failed",
         webhooks: None,
     }
 }

@@ -1,4 +1,6 @@
-//! The counters, gauges and histograms of the service, and their text for Prometheus (`/metrics`).
+//! The counters, gauges and histograms of the service, their text for Prometheus (`/metrics`), and failures of late.
+
+pub mod failures;
 
 use std::time::Duration;
 
@@ -7,6 +9,8 @@ use prometheus::{
     Encoder as _, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Opts, Registry,
     TextEncoder,
 };
+
+use failures::Failures;
 
 /// The media type of the text.
 pub const MEDIA_TYPE: &str = prometheus::TEXT_FORMAT;
@@ -39,6 +43,7 @@ pub struct Metrics {
     resident: IntGauge,
     shared: IntGaugeVec,
     shared_oldest: IntGauge,
+    failures: Failures,
 }
 
 impl std::fmt::Debug for Metrics {
@@ -144,6 +149,7 @@ impl Metrics {
                 r,
                 IntGauge::new("meshsnap_servers", "Servers of the service that this one hears of, itself too.")?,
             )?,
+            failures: Failures::default(),
             registry,
         })
     }
@@ -163,13 +169,29 @@ impl Metrics {
         self.ends.with_label_values(&[class, end]).inc();
     }
 
-    /// An answer was given; `code` is that of an error.
-    pub fn answered(&self, status: u16, code: Option<&str>) {
-        let status = status.to_string();
-        self.answers.with_label_values(&[status.as_str()]).inc();
+    /// A job whose end is fetched later has failed.
+    pub fn job_failed(&self, code: &'static str) {
+        self.failures.add("job", None, code);
+    }
+
+    /// An answer was given at a place: a method and a route. `code` is that of an error.
+    pub fn answered(&self, place: &str, status: u16, code: Option<&'static str>) {
+        let word = status.to_string();
+        self.answers.with_label_values(&[word.as_str()]).inc();
         if let Some(code) = code {
-            self.rejections.with_label_values(&[status.as_str(), code]).inc();
+            self.rejections.with_label_values(&[word.as_str(), code]).inc();
+            self.failures.add(place, Some(status), code);
         }
+    }
+
+    /// Failures of late, by kind.
+    pub fn failures(&self) -> Vec<failures::Failure> {
+        self.failures.list()
+    }
+
+    /// Pictures of stored meshes that were given with an outcome.
+    pub fn picture_count(&self, outcome: &str) -> u64 {
+        self.pictures.with_label_values(&[outcome]).get()
     }
 
     /// A picture of a stored mesh was given.
