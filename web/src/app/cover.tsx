@@ -1,0 +1,125 @@
+import { useRef } from "preact/hooks";
+import { keepKey, needsKey } from "../api/key";
+import { filesOfInput } from "../files/drop";
+import { cancelUpload, goOnWithKey, lastFiles, openFiles, openSample } from "../files/open";
+import { capabilities, mesh } from "../state/mesh";
+import { phase } from "../state/phase";
+import { strings } from "../strings";
+import { begin } from "./begin";
+
+/** What stands in place of the picture while there is none. */
+export function Cover() {
+  const state = phase.value;
+  if (needsKey.value) return <KeyForm />;
+  switch (state.kind) {
+    case "open": return null;
+    case "sending": return <Sending name={state.name} share={state.share} />;
+    case "refused": return <Refused />;
+    case "lost": return <Lost />;
+    case "empty": return <Empty />;
+  }
+}
+
+function Empty() {
+  const formats = capabilities.value?.mesh_formats ?? ["obj", "gltf", "glb", "stl", "ply"];
+  return (
+    <div class="cover" data-test="empty">
+      <DropMark />
+      <h1>{strings.open.heading}</h1>
+      <p>{strings.open.formats(formats)}. {capabilities.value && strings.open.limit(capabilities.value.limits.body_bytes)}</p>
+      <Openers />
+      <p class="quiet">{strings.open.privacy(location.host)}</p>
+    </div>
+  );
+}
+
+function DropMark() {
+  return (
+    <svg class="mark" viewBox="0 0 64 64" width="64" height="64" aria-hidden="true">
+      <path d="M32 6 56 19v26L32 58 8 45V19Z M8 19l24 13 24-13 M32 32v26" fill="none" stroke="currentColor" stroke-width="1.5" stroke-linejoin="round" />
+    </svg>
+  );
+}
+
+function Openers() {
+  const files = useRef<HTMLInputElement>(null);
+  const folder = useRef<HTMLInputElement>(null);
+  const take = (input: HTMLInputElement) => {
+    const chosen = filesOfInput(input.files!);
+    input.value = "";
+    if (chosen.length > 0) void openFiles(chosen);
+  };
+  return (
+    <div class="openers">
+      <button type="button" class="primary" onClick={() => files.current?.click()} data-test="choose-files">{strings.open.files}</button>
+      <button type="button" onClick={() => folder.current?.click()} data-test="choose-folder">{strings.open.folder}</button>
+      <button type="button" onClick={() => void openSample()} data-test="sample">{strings.open.sample}</button>
+      <input ref={files} type="file" multiple hidden onChange={(e) => take(e.currentTarget)} data-test="files-input" />
+      <input ref={folder} type="file" hidden {...{ webkitdirectory: true }} onChange={(e) => take(e.currentTarget)} data-test="folder-input" />
+    </div>
+  );
+}
+
+function Sending({ name, share }: { name: string; share: number }) {
+  return (
+    <div class="cover" data-test="sending">
+      <h1>{share < 1 ? strings.open.sending(name) : strings.open.reading}</h1>
+      <progress value={share < 1 ? share : undefined} max={1} aria-label={strings.open.sending(name)} />
+      <button type="button" onClick={cancelUpload}>{strings.open.cancel}</button>
+    </div>
+  );
+}
+
+function Refused() {
+  const state = phase.value;
+  if (state.kind !== "refused") return null;
+  const files = lastFiles();
+  return (
+    <div class="cover" data-test="refused">
+      <h1><bdi>{strings.refused.heading(state.name)}</bdi></h1>
+      <p role="alert" class="refusal-text" data-test="refusal" data-code={state.code}>{state.detail}</p>
+      {state.flag && <p class="quiet">{strings.refused.flag(state.flag)}</p>}
+      {state.choices.length > 0 && files && <>
+        <p>{strings.refused.choose}</p>
+        <ul class="choices">{state.choices.slice(0, 100).map((path) => (
+          <li key={path}><button type="button" onClick={() => void openFiles(files, path)} data-test={`entry-${path}`}><bdi>{path}</bdi></button></li>
+        ))}</ul>
+      </>}
+      <Openers />
+      {mesh.value && <button type="button" class="link" onClick={() => (phase.value = { kind: "open" })}>{strings.refused.back}</button>}
+    </div>
+  );
+}
+
+function Lost() {
+  const state = phase.value;
+  if (state.kind !== "lost") return null;
+  return (
+    <div class="cover" data-test="lost">
+      <h1>{strings.lost.heading}</h1>
+      <p><bdi>{strings.lost.text(state.name)}</bdi></p>
+      <Openers />
+    </div>
+  );
+}
+
+function KeyForm() {
+  const input = useRef<HTMLInputElement>(null);
+  const use = (event: Event) => {
+    event.preventDefault();
+    const key = input.current?.value.trim();
+    if (!key) return;
+    keepKey(key);
+    void begin().then(goOnWithKey);
+  };
+  return (
+    <form class="cover" onSubmit={use} data-test="key-form">
+      <h1>{strings.key.heading}</h1>
+      <p class="quiet">{strings.key.text}</p>
+      <div class="openers">
+        <label class="key-label">{strings.key.label} <input ref={input} type="password" autocomplete="off" data-test="key" /></label>
+        <button type="submit" class="primary" data-test="key-use">{strings.key.save}</button>
+      </div>
+    </form>
+  );
+}

@@ -1,0 +1,37 @@
+import { endStep } from "../state/history";
+import { touch } from "../picture/live";
+import { strings } from "../strings";
+import type { Edit } from "./field";
+
+const SWATCHES = ["#000000", "#ffffff", "#e02020", "#f05a1e", "#f2b705", "#2a9d5b", "#1f6feb", "#8c96a0"];
+
+/** A colour of six digits for the browser's own picker, which knows no others. */
+export function opaque(colour: string): string {
+  const digits = colour.replace(/^#/, "");
+  if (/^[0-9a-f]{3,4}$/i.test(digits)) return `#${[...digits.slice(0, 3)].map((d) => d + d).join("")}`;
+  return /^[0-9a-f]{6}/i.test(digits) ? `#${digits.slice(0, 6)}` : "#808080";
+}
+
+/** A colour: the browser's picker, text for all that the key takes, and swatches. */
+export function ColourInput({ id, edit, fallback }: { id: string; edit: Edit; fallback: unknown }) {
+  const stated = edit.value ?? fallback;
+  const text = typeof stated === "string" ? stated : "";
+  const pick = (colour: string) => {
+    endStep();
+    edit.set(colour);
+  };
+  return (
+    <div class="colour">
+      <input type="color" value={opaque(text || "#808080")} class={text ? "" : "is-unset"} aria-label={strings.controls.picker(id)}
+        onInput={(e) => { touch(); edit.set(e.currentTarget.value); }} />
+      <input type="text" id={id} value={edit.value === null ? "" : text} placeholder={strings.controls.byDefault} spellcheck={false}
+        onChange={(e) => pick(e.currentTarget.value.trim())} />
+      <span class="swatches">
+        {SWATCHES.map((colour) => (
+          <button type="button" key={colour} class={`swatch s${colour.slice(1)}`} title={colour} tabIndex={-1}
+            aria-label={strings.controls.swatch(id, colour)} onClick={() => pick(colour)} />
+        ))}
+      </span>
+    </div>
+  );
+}

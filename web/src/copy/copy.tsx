@@ -1,0 +1,95 @@
+import { signal } from "@preact/signals";
+import { apiKey } from "../api/key";
+import { finished, wanted } from "../picture/live";
+import { capabilities, stem } from "../state/mesh";
+import { announcement } from "../state/phase";
+import { chosenSize, extension, type Format, format, pictureSize, readSize, sizeText } from "../state/size";
+import { strings } from "../strings";
+import { KINDS, type LineKind, lineOf } from "./lines";
+
+const kind = signal<LineKind>("url");
+const copied = signal<string | null>(null);
+const custom = signal(false);
+
+const SIZES = ["256", "512", "1024", "800x600", "1280x720", "1920x1080"];
+
+export async function copyText(text: string, what: string): Promise<void> {
+  try {
+    await navigator.clipboard.writeText(text);
+    copied.value = what;
+    announcement.value = strings.copy.copied;
+  } catch {
+    copied.value = `${what}-failed`;
+    announcement.value = strings.copy.failed;
+  }
+  setTimeout(() => (copied.value = null), 2000);
+}
+
+export function CopyPanel() {
+  const picture = wanted.value;
+  if (!picture) return null;
+  const limit = capabilities.value?.limits?.image_px ?? 4096;
+  const keyed = apiKey.value !== null;
+  const text = lineOf(kind.value, picture, { keyed, limit });
+  const withKey = keyed && ["curl", "python", "javascript"].includes(kind.value);
+  return (
+    <section class="copy" aria-label={strings.copy.heading}>
+      <div class="copy-head">
+        <OutputControls />
+        <span class="spring" />
+        <DownloadButton />
+      </div>
+      <div class="kinds" role="group" aria-label={strings.copy.heading}>
+        {KINDS.map((name) => <button type="button" key={name} class="segment" aria-pressed={kind.value === name}
+          data-test={`copy-${name}`} onClick={() => (kind.value = name)}>{strings.copy.kinds[name]}</button>)}
+      </div>
+      <div class="line">
+        <pre tabIndex={0} data-test="copy-text" aria-label={strings.copy.kinds[kind.value]}>{text}</pre>
+        <button type="button" class="primary" data-test="copy" onClick={() => void copyText(text, "line")}>
+          {copied.value === "line" ? strings.copy.copied : strings.copy.copy}</button>
+      </div>
+      <p class="quiet">{copied.value === "line-failed" ? strings.copy.failed : strings.copy.notes[kind.value]}
+        {withKey && ` ${strings.copy.keyNote}`}</p>
+    </section>
+  );
+}
+
+function OutputControls() {
+  const value = custom.value ? "custom" : chosenSize.value ? sizeText(chosenSize.value) : "window";
+  const pick = (text: string) => {
+    custom.value = text === "custom";
+    if (text === "window") chosenSize.value = null;
+    else if (text !== "custom") chosenSize.value = readSize(text);
+    else chosenSize.value ??= pictureSize.value;
+  };
+  const own = SIZES.includes(value) || value === "window" || value === "custom" ? [] : [value];
+  const formats = (capabilities.value?.image_formats ?? ["webp", "png", "jpeg"]) as Format[];
+  return (
+    <>
+      <label>{strings.copy.size}
+        <select value={value} data-test="size" onChange={(e) => pick(e.currentTarget.value)}>
+          <option value="window">{strings.copy.window(sizeText(chosenSize.value ? { width: 0, height: 0 } : pictureSize.value).replace(/^0$/, "…"))}</option>
+          {[...SIZES, ...own].map((size) => <option key={size} value={size}>{size.replace("x", " × ")}</option>)}
+          <option value="custom">{strings.copy.custom}</option>
+        </select>
+      </label>
+      {custom.value && <input type="text" class="size" aria-label={strings.copy.customLabel} title={strings.copy.customLabel}
+        value={sizeText(pictureSize.value)} data-test="size-custom"
+        onChange={(e) => { const size = readSize(e.currentTarget.value); if (size) chosenSize.value = size; }} />}
+      <label>{strings.copy.format}
+        <select value={format.value} data-test="format" onChange={(e) => (format.value = e.currentTarget.value as Format)}>
+          {formats.map((name) => <option key={name} value={name}>{name}</option>)}
+        </select>
+      </label>
+    </>
+  );
+}
+
+/** Stores the picture that is shown: the very bytes. */
+function DownloadButton() {
+  const current = finished.value;
+  const picture = wanted.value;
+  if (!current || !picture) return null;
+  const name = `${stem(picture.mesh)}.${extension(current.picture.format)}`;
+  return <a class="button" href={current.url} download={name} data-test="download">{strings.copy.download}</a>;
+}

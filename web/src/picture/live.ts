@@ -1,0 +1,99 @@
+import { computed, effect, signal } from "@preact/signals";
+import type { Picture } from "../state/address";
+import { look } from "../state/history";
+import { mesh } from "../state/mesh";
+import { announcement, phase, pictureRefusal } from "../state/phase";
+import { format, pictureSize, shownSize, type Size, within } from "../state/size";
+import { strings } from "../strings";
+import { PictureLoop, type Shown } from "./loop";
+
+/** The newest picture, drafts too. */
+export const shown = signal<Shown | null>(null);
+/** The newest picture of full size. */
+export const finished = signal<Shown | null>(null);
+export const busy = signal(false);
+
+/** True while something is dragged: pictures are then small, so that they come quickly. */
+export const moving = signal(false);
+
+const SETTLE_MS = 180;
+const DRAFT_GOAL_MS = 60;
+let draftSide = 320;
+let settle: ReturnType<typeof setTimeout> | undefined;
+
+/** Says that something moves for now: by a wheel, a key or a slider, which have no clear end. */
+export function touch(): void {
+  moving.value = true;
+  clearTimeout(settle);
+  settle = setTimeout(() => (moving.value = false), SETTLE_MS);
+}
+
+/** Says that a drag begins or ends. */
+export function hold(active: boolean): void {
+  clearTimeout(settle);
+  moving.value = active;
+}
+
+/** Adapts the size of drafts to the time that they take. */
+function learn({ draft, tookMs }: Shown): void {
+  if (!draft) return;
+  if (tookMs > DRAFT_GOAL_MS * 1.1) draftSide = Math.max(128, draftSide * 0.88);
+  else if (tookMs < DRAFT_GOAL_MS * 0.6) draftSide = Math.min(720, draftSide * 1.06);
+}
+
+export const loop = new PictureLoop({
+  shown(next) {
+    learn(next);
+    const previous = shown.value;
+    shown.value = next;
+    pictureRefusal.value = null;
+    if (!next.draft) {
+      const last = finished.value;
+      finished.value = next;
+      announcement.value = strings.picture.announced(next.picture.size);
+      if (last && last !== previous) URL.revokeObjectURL(last.url);
+    }
+    if (previous && previous !== finished.value) setTimeout(() => URL.revokeObjectURL(previous.url), 1000);
+  },
+  refused(refusal) {
+    if (refusal.problem.code === "mesh_unknown" && mesh.value) {
+      phase.value = { kind: "lost", name: mesh.value.name, sha256: mesh.value.sha256 };
+      return;
+    }
+    if (refusal.status !== 401) {
+      pictureRefusal.value = refusal;
+      announcement.value = refusal.message;
+    }
+  },
+  busy: (is) => (busy.value = is),
+});
+
+/** The picture that the page asks for, at full size. */
+export const wanted = computed<Picture | null>(() => {
+  if (!mesh.value || phase.value.kind !== "open") return null;
+  if (pictureSize.value.width < 2) return null;
+  return { mesh: mesh.value, look: look.value, size: pictureSize.value, format: format.value };
+});
+
+/** A small picture of the same: quick to draw, with the same proportions. */
+export function draftOf(picture: Picture): Picture {
+  const size = within(picture.size, draftMost(picture.size));
+  const keys = { ...picture.look.keys };
+  if (!("image.samples" in keys) && !("image.max_error" in keys)) keys["image.samples"] = 4;
+  return { ...picture, look: { ...picture.look, keys }, size, format: "webp" };
+}
+
+function draftMost(size: Size): number {
+  const onScreen = Math.max(shownSize.value.width, shownSize.value.height);
+  return Math.round(Math.min(draftSide, onScreen, Math.max(size.width, size.height)) / 8) * 8 || 8;
+}
+
+/** Asks for pictures whenever what is wanted changes. */
+export function startPictures(): () => void {
+  return effect(() => {
+    const picture = wanted.value;
+    if (!picture) return loop.stop();
+    if (moving.value) loop.want(draftOf(picture), true);
+    else loop.want(picture, false);
+  });
+}

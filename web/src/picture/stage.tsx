@@ -1,0 +1,103 @@
+import { useEffect, useRef } from "preact/hooks";
+import { fit, showView, zoom } from "../camera/move";
+import { CompareLayer } from "../compare/layer";
+import { CompareMenu } from "../compare/menu";
+import { setKey } from "../state/edit";
+import { endStep, look } from "../state/history";
+import { mesh } from "../state/mesh";
+import { connection, pictureRefusal } from "../state/phase";
+import { room, shownSize } from "../state/size";
+import { strings } from "../strings";
+import { gestures } from "./gestures";
+import { busy, finished, shown } from "./live";
+
+/** The picture, with all that turns it. */
+export function Stage() {
+  const frame = useRef<HTMLDivElement>(null);
+  const picture = useRef<HTMLDivElement>(null);
+  useEffect(() => observe(frame.current!), []);
+  useEffect(() => gestures(picture.current!), []);
+  return (
+    <section class="stage" aria-label={strings.picture.stage.split(".")[0]}>
+      <Toolbar />
+      <div class="frame" ref={frame}>
+        <div class="picture" ref={picture} tabIndex={0} role="application" aria-label={strings.picture.stage}
+          aria-busy={busy.value} data-test="stage" title={strings.picture.hint}>
+          <PictureImage />
+          <CompareLayer />
+        </div>
+        {busy.value && <span class="progress" aria-hidden="true" />}
+        <Messages />
+      </div>
+    </section>
+  );
+}
+
+/** Keeps the room for the picture up to date. */
+function observe(frame: HTMLElement): () => void {
+  const observer = new ResizeObserver(() => {
+    const next = { width: Math.floor(frame.clientWidth), height: Math.floor(frame.clientHeight) };
+    const { width, height } = room.peek();
+    if (next.width !== width || next.height !== height) room.value = next;
+  });
+  observer.observe(frame);
+  return () => observer.disconnect();
+}
+
+function PictureImage() {
+  const current = shown.value;
+  const box = useRef<HTMLImageElement>(null);
+  const { width, height } = shownSize.value;
+  useEffect(() => {
+    if (!box.current) return;
+    box.current.style.width = `${width}px`;
+    box.current.style.height = `${height}px`;
+  });
+  if (!current) return null;
+  const style = String(current.picture.look.keys["style"] ?? "auto");
+  const transparent = look.value.keys["image.background"] === "transparent";
+  return <img ref={box} class={`shot ${transparent ? "is-transparent" : ""}`} src={current.url} draggable={false}
+    alt={strings.picture.alt(current.picture.mesh.name, style)} data-test="picture" data-draft={current.draft}
+    data-path={current.path} data-finished={finished.value?.path} />;
+}
+
+const VIEWS = ["iso", "front", "back", "left", "right", "top", "bottom"] as const;
+const BACKGROUNDS = { white: "#fff", grey: "#f4f6f9..#c3cad4", dark: "#2a2f37..#14171c", transparent: "transparent" } as const;
+
+function Toolbar() {
+  const view = String(look.value.keys["camera.view"] ?? "");
+  const background = look.value.keys["image.background"] ?? "#fff";
+  return (
+    <div class="toolbar" role="toolbar" aria-label={strings.picture.view}>
+      <div class="group">
+        <button type="button" onClick={() => { endStep(); fit(); }} data-test="fit" title={strings.picture.fit}>{strings.picture.fit}</button>
+        <button type="button" onClick={() => void zoom(1 / 1.25)} aria-label={strings.picture.zoomOut} title={strings.picture.zoomOut} data-test="zoom-out">−</button>
+        <button type="button" onClick={() => void zoom(1.25)} aria-label={strings.picture.zoomIn} title={strings.picture.zoomIn} data-test="zoom-in">+</button>
+      </div>
+      <div class="group views" role="group" aria-label={strings.picture.view}>
+        {VIEWS.map((name) => <button type="button" key={name} class="segment" aria-pressed={view === name} data-test={`view-${name}`}
+          onClick={() => { endStep(); showView(name); }}>{strings.picture.views[name]}</button>)}
+      </div>
+      <div class="group backgrounds" role="group" aria-label={strings.picture.background}>
+        {(Object.keys(BACKGROUNDS) as (keyof typeof BACKGROUNDS)[]).map((name) => (
+          <button type="button" key={name} class={`swatch bg-${name}`} aria-pressed={background === BACKGROUNDS[name]}
+            aria-label={strings.picture.backgrounds[name]} title={strings.picture.backgrounds[name]} data-test={`background-${name}`}
+            onClick={() => { endStep(); setKey("image.background", name === "white" ? undefined : BACKGROUNDS[name]); }} />
+        ))}
+      </div>
+      <span class="spring" />
+      {mesh.value && <CompareMenu />}
+    </div>
+  );
+}
+
+function Messages() {
+  const refusal = pictureRefusal.value;
+  if (!refusal || connection.value.kind !== "good") return null;
+  return (
+    <div class="message is-refusal" role="alert" data-test="picture-refusal">
+      <strong>{strings.picture.refused}</strong>
+      <span>{refusal.message}</span>
+    </div>
+  );
+}

@@ -1,0 +1,80 @@
+import { effect, signal } from "@preact/signals";
+import { request } from "../api/client";
+import { picturePath } from "../state/address";
+import { look } from "../state/history";
+import { effective, isView, type Look } from "../state/look";
+import { capabilities, mesh } from "../state/mesh";
+import { busy, finished, moving } from "./live";
+import { PRESETS } from "./presets";
+
+/** A look to choose, beside what it adds to the look that is shown. */
+export interface Offer {
+  id: string;
+  name: string;
+  look: Look;
+}
+
+export const thumbnails = signal<Readonly<Record<string, string>>>({});
+export const savedPresets = signal<Offer[]>([]);
+
+const SIDE_PX = Math.round(88 * Math.min(2, Math.max(1, window.devicePixelRatio || 1)));
+
+export function styleOffers(): Offer[] {
+  return (capabilities.value?.styles ?? []).map((style) => ({
+    id: `style-${style}`,
+    name: style,
+    look: { keys: { ...look.value.keys, style }, materials: look.value.materials },
+  }));
+}
+
+export function presetOffers(): Offer[] {
+  const offers = PRESETS.map(({ name, look: own }) => ({ id: `preset-${name.replaceAll(" ", "-")}`, name, look: own }));
+  return [...offers, ...savedPresets.value];
+}
+
+/** The look of a thumbnail: an offer from the direction of now, small, with the whole mesh in sight. */
+function small(own: Look): Look {
+  const view = Object.entries(look.peek().keys).filter(([key]) => isView(key) || key === "camera.up" || key === "scene.time_s");
+  const keys = { ...own.keys, ...Object.fromEntries(view) };
+  return effective({ keys, materials: own.materials });
+}
+
+let round = 0;
+
+/** Draws thumbnails one after the other, whenever no picture is under way. */
+export function startThumbnails(): () => void {
+  return effect(() => {
+    const open = mesh.value;
+    const ready = finished.value;
+    if (!open || !ready || moving.value || busy.value || ready.picture.mesh !== open) return;
+    const offers = [...styleOffers(), ...presetOffers()];
+    const own = ++round;
+    const timer = setTimeout(() => void draw(offers, own), 250);
+    return () => {
+      round++;
+      clearTimeout(timer);
+    };
+  });
+}
+
+const addresses = new Map<string, string>();
+
+async function draw(offers: Offer[], own: number): Promise<void> {
+  for (const offer of offers) {
+    const open = mesh.peek();
+    if (own !== round || !open) return;
+    const size = { width: SIDE_PX, height: SIDE_PX };
+    const path = picturePath({ mesh: open, look: small(offer.look), size, format: "webp" });
+    if (addresses.get(offer.id) === path) continue;
+    try {
+      const url = URL.createObjectURL(await (await request(path)).blob());
+      if (own !== round) return URL.revokeObjectURL(url);
+      const before = thumbnails.peek()[offer.id];
+      thumbnails.value = { ...thumbnails.peek(), [offer.id]: url };
+      addresses.set(offer.id, path);
+      if (before) setTimeout(() => URL.revokeObjectURL(before), 1000);
+    } catch {
+      // A look that the server refuses keeps its empty place.
+    }
+  }
+}

@@ -1,0 +1,80 @@
+import { signal, useSignalEffect } from "@preact/signals";
+import { postJson } from "../api/client";
+import type { Verdict } from "../api/types";
+import { flyTo } from "../camera/move";
+import type { Vec } from "../camera/vector";
+import { queryOf } from "../state/look";
+import { mesh, readingPairs, type OpenMesh } from "../state/mesh";
+import { endStep } from "../state/history";
+import { strings } from "../strings";
+
+type Check = Verdict["checks"][number];
+
+const RULES = "watertight,manifold,consistent-winding,no-degenerate,no-duplicate-faces,no-loose-vertices,no-inverted-volume";
+const FAULTS_SHOWN = 20;
+
+const words = strings.report;
+const verdict = signal<{ of: OpenMesh; checks: Check[] } | { of: OpenMesh; failed: string } | null>(null);
+/** The fault that the camera looks at. */
+const current = signal<string | null>(null);
+
+async function check(of: OpenMesh): Promise<void> {
+  try {
+    const query = queryOf([...readingPairs(of), ["rules", RULES]]);
+    const { checks } = await postJson<Verdict>(`v1/check?${query}`, { mesh: of.sha256 });
+    if (mesh.peek() === of) verdict.value = { of, checks };
+  } catch (error) {
+    if (mesh.peek() === of) verdict.value = { of, failed: error instanceof Error ? error.message : String(error) };
+  }
+}
+
+/** The verdict of rules about how the mesh hangs together, and the places of its faults. */
+export function Checks() {
+  useSignalEffect(() => {
+    const open = mesh.value;
+    if (open && verdict.peek()?.of !== open) void check(open);
+  });
+  const found = verdict.value;
+  if (!found || found.of !== mesh.value) return <p class="quiet">{words.checking}</p>;
+  if ("failed" in found) return <p class="quiet">{found.failed}</p>;
+  const anyPlaces = found.checks.some(({ where }) => where.length > 0);
+  return (
+    <>
+      {anyPlaces && <p class="quiet">{words.faults}</p>}
+      <ul class="checks">{found.checks.map((one) => <CheckItem key={one.rule} check={one} />)}</ul>
+    </>
+  );
+}
+
+function CheckItem({ check: { rule, ok, level, detail, where, found } }: { check: Check }) {
+  const state = ok ? "passed" : level === "warn" ? "warned" : "failed";
+  const rest = typeof found === "number" ? found - where.length : 0;
+  return (
+    <li class={`check is-${state}`} data-test={`check-${rule}`}>
+      <span class="verdict">{words[state]}</span> <strong>{rule}</strong>
+      {!ok && <p>{detail}</p>}
+      {where.length > 0 && <div class="faults">
+        {where.slice(0, FAULTS_SHOWN).map((place, i) => <Fault key={i} id={`${rule}-${i}`} number={i + 1} place={place} />)}
+        {rest > 0 && <span class="quiet">{words.moreFaults(rest)}</span>}
+      </div>}
+    </li>
+  );
+}
+
+function Fault({ id, number, place }: { id: string; number: number; place: object }) {
+  const [kind, points] = pointsOf(place);
+  const fly = () => {
+    endStep();
+    current.value = id;
+    flyTo(points);
+  };
+  return <button type="button" class="fault" aria-pressed={current.value === id} data-test={`fault-${id}`}
+    title={points.map((p) => `(${p.join(", ")})`).join(" ")} aria-label={`${words.fault(number)}: ${kind}`} onClick={fly}>{number}</button>;
+}
+
+function pointsOf(place: object): [string, Vec[]] {
+  const { edge, face, vertex } = place as { edge?: Vec[]; face?: Vec[]; vertex?: Vec };
+  if (edge) return [words.kinds.edge, edge];
+  if (face) return [words.kinds.face, face];
+  return vertex ? [words.kinds.vertex, [vertex]] : [words.kinds.fault, []];
+}
