@@ -210,10 +210,10 @@ export const strings = {
   },
 
   compare: {
-    start: "Compare",
-    looks: "With the look of now",
+    start: "Compare with",
+    looks: "a look",
     looksHelp: "Keeps this look on the left side. Then change the settings.",
-    mesh: "With another mesh…",
+    mesh: "a mesh…",
     stop: "End comparison",
     left: "Left", right: "Right",
     divider: "Divider between the two pictures",
