@@ -22,7 +22,10 @@ import { Notices } from "./notices";
 const TABS = ["looks", "settings", "materials", "report", "explain", "copy"] as const;
 type Tab = (typeof TABS)[number];
 
-const tab = signal<Tab>("settings");
+/** True where one panel shows at a time; looks then come first. */
+const narrowQuery = matchMedia("(max-width: 860px)");
+const narrow = signal(narrowQuery.matches);
+const tab = signal<Tab>(narrow.value ? "looks" : "settings");
 const dropping = signal(false);
 
 export function App() {
@@ -43,6 +46,7 @@ export function App() {
 
 function Bench() {
   const side = tab.value === "looks" || tab.value === "copy" ? "settings" : tab.value;
+  const selected = narrow.value ? tab.value : side;
   return (
     <>
       <nav class="panel left" aria-label={strings.tabs.looks}><Looks /></nav>
@@ -51,7 +55,7 @@ function Bench() {
       <div class="panel right">
         <div class="tabs" role="tablist" aria-label={strings.tabs.panels} onKeyDown={tabKeys}>
           {TABS.map((name) => <button type="button" role="tab" key={name} id={`tab-${name}`} class={`tab tab-${name}`}
-            aria-selected={tab.value === name || side === name} aria-controls="panel" tabIndex={side === name || tab.value === name ? 0 : -1}
+            aria-selected={selected === name} aria-controls="panel" tabIndex={selected === name ? 0 : -1}
             data-test={`tab-${name}`} onClick={() => (tab.value = name)}>{strings.tabs[name]}</button>)}
         </div>
         <div class="panel-body" role="tabpanel" id="panel" aria-labelledby={`tab-${side}`} tabIndex={-1}>
@@ -81,6 +85,7 @@ function tabKeys(event: KeyboardEvent): void {
 function listen(): () => void {
   const off = new AbortController();
   const on = { signal: off.signal };
+  narrowQuery.addEventListener("change", () => (narrow.value = narrowQuery.matches), on);
   const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
   addEventListener("dragover", (event) => {
     if (!hasFiles(event)) return;

@@ -25,7 +25,7 @@ function Empty() {
   return (
     <div class="cover" data-test="empty">
       <DropMark />
-      <h1>{strings.open.heading}</h1>
+      <h2 class="title">{strings.open.heading}</h2>
       <p>{strings.open.formats(formats)}. {capabilities.value && strings.open.limit(capabilities.value.limits.body_bytes)}</p>
       <Openers />
       <p class="quiet">{strings.open.privacy(location.host)}</p>
@@ -63,7 +63,7 @@ function Openers() {
 function Sending({ name, share }: { name: string; share: number }) {
   return (
     <div class="cover" data-test="sending">
-      <h1>{share < 1 ? strings.open.sending(name) : strings.open.reading}</h1>
+      <h2 class="title">{share < 1 ? strings.open.sending(name) : strings.open.reading}</h2>
       <progress value={share < 1 ? share : undefined} max={1} aria-label={strings.open.sending(name)} />
       <button type="button" onClick={cancelUpload}>{strings.open.cancel}</button>
     </div>
@@ -76,7 +76,7 @@ function Refused() {
   const files = lastFiles();
   return (
     <div class="cover" data-test="refused">
-      <h1><bdi>{strings.refused.heading(state.name)}</bdi></h1>
+      <h2 class="title"><bdi>{strings.refused.heading(state.name)}</bdi></h2>
       <p role="alert" class="refusal-text" data-test="refusal" data-code={state.code}>{state.detail}</p>
       {state.flag && <p class="quiet">{strings.refused.flag(state.flag)}</p>}
       {state.choices.length > 0 && files && <>
@@ -96,7 +96,7 @@ function Lost() {
   if (state.kind !== "lost") return null;
   return (
     <div class="cover" data-test="lost">
-      <h1>{strings.lost.heading}</h1>
+      <h2 class="title">{strings.lost.heading}</h2>
       <p><bdi>{strings.lost.text(state.name)}</bdi></p>
       <Openers />
     </div>
@@ -114,7 +114,7 @@ function KeyForm() {
   };
   return (
     <form class="cover" onSubmit={use} data-test="key-form">
-      <h1>{strings.key.heading}</h1>
+      <h2 class="title">{strings.key.heading}</h2>
       <p class="quiet">{strings.key.text}</p>
       <div class="openers">
         <label class="key-label">{strings.key.label} <input ref={input} type="password" autocomplete="off" data-test="key" /></label>

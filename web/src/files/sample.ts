@@ -11,7 +11,11 @@ export function sampleObj(): string {
 
 type P = [number, number, number];
 
-const vertex = (p: P): string => `v ${p.map((v) => v.toFixed(4)).join(" ")}`;
+/** A vertex with its colour: warm to cool by `share`. */
+function vertex(p: P, share: number): string {
+  const colour = [0.86 - 0.5 * share, 0.42 + 0.16 * share, 0.3 + 0.42 * share];
+  return `v ${p.map((v) => v.toFixed(4)).join(" ")} ${colour.map((v) => v.toFixed(3)).join(" ")}`;
+}
 
 function curve(t: number): P {
   const r = 2 + Math.cos(3 * t);
@@ -30,7 +34,7 @@ function knot(vertices: string[], faces: string[]): void {
     for (let j = 0; j < sides; j++) {
       const a = (j / sides) * 2 * Math.PI;
       const at = (k: 0 | 1 | 2) => p[k] + radius * (out[k] * Math.cos(a) + side[k] * Math.sin(a));
-      vertices.push(vertex([at(0), at(1), at(2)]));
+      vertices.push(vertex([at(0), at(1), at(2)], 0.5 - 0.5 * Math.cos(t)));
     }
   }
   const id = (i: number, j: number) => (i % rings) * sides + (j % sides) + 1;
@@ -45,7 +49,7 @@ function plate(vertices: string[], faces: string[]): void {
   for (const [radius, y] of [[1.1, 0.14], [1.2, 0.04], [1.2, -0.1]] as const) {
     for (let j = 0; j < sides; j++) {
       const a = (j / sides) * 2 * Math.PI;
-      vertices.push(vertex([radius * Math.cos(a), y, radius * -Math.sin(a)]));
+      vertices.push(vertex([radius * Math.cos(a), y, radius * -Math.sin(a)], 0.9));
     }
   }
   const id = (ring: number, j: number) => first + ring * sides + (j % sides);
