@@ -98,15 +98,28 @@ fn a_form_brings_its_document_and_the_query_overrides_it() {
 fn the_front_page_says_what_this_is() {
     let server = Server::start(&[]);
     let page = server.get("/");
-    assert_eq!((page.status, page.header("content-type")), (200, Some("text/html; charset=utf-8")));
+    assert_eq!((page.status, page.header("content-type")), (200, Some("text/plain; charset=utf-8")));
     let text = String::from_utf8(page.body).unwrap();
     assert!(text.contains("curl --data-binary @model.obj 'http://localhost/v1/render?style=wire'"), "{text}");
-    for link in text.split("href=\"").skip(1).map(|rest| rest.split('"').next().unwrap()) {
-        assert_eq!(server.get(link).status, 200, "{link}");
+    let paths: Vec<&str> = text.lines().filter(|line| line.starts_with("  /")).flat_map(str::split_whitespace).collect();
+    let paths: Vec<&str> = paths.into_iter().filter(|word| word.starts_with('/')).collect();
+    assert_eq!(paths.len(), 9, "{paths:?}");
+    for path in paths {
+        assert_eq!(server.get(path).status, 200, "{path}");
     }
-    // A host that could mean something in HTML or a shell is not written there.
+    // Browsers get pages. Their script and their style are allowed, and nothing else is.
+    for path in ["/", "/status"] {
+        let page = server.request("GET", path, &["Accept: text/html,application/xhtml+xml,*/*;q=0.8"], b"");
+        assert_eq!((page.status, page.header("content-type")), (200, Some("text/html; charset=utf-8")));
+        let policy = page.header("content-security-policy").unwrap();
+        assert!(policy.starts_with("default-src 'none'; script-src 'sha256-"), "{policy}");
+        assert!(!policy.contains("unsafe") && policy.matches("'sha256-").count() == 2, "{policy}");
+        let known = format!("If-None-Match: {}", page.header("etag").unwrap());
+        assert_eq!(server.request("GET", path, &["Accept: text/html", &known], b"").status, 304);
+    }
+    // A host that could mean something in a shell is not written there.
     let hostile = server.send("GET / HTTP/1.1\r\nHost: <script>\r\nConnection: close\r\n\r\n", b"");
-    assert!(!String::from_utf8_lossy(&hostile.body).contains("script"), "{hostile:?}");
+    assert!(!String::from_utf8_lossy(&hostile.body).contains("script>"), "{hostile:?}");
 }
 
 #[test]

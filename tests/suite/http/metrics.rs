@@ -81,3 +81,74 @@ fn metrics_want_a_key_where_keys_are_configured() {
     server.get("/metrics").problem(401, "unauthorized");
     assert_eq!(server.request("GET", "/metrics", &["Authorization: Bearer one"], b"").status, 200);
 }
+
+/// The JSON for operators has the numbers of the metrics, and says what failed without a word of the client's.
+#[test]
+fn the_status_agrees_with_the_metrics() {
+    let server = Server::start(&["--workers", "2"]);
+    let mesh = server.post("/v1/meshes", CUBE_OBJ).header("location").unwrap().to_owned();
+    for _ in 0..3 {
+        server.get(&format!("{mesh}/render.png?size=16")).picture(16, 16);
+        server.post("/v1/render?secret=1", CUBE_OBJ).problem(400, "unknown_key");
+    }
+    server.request("SECRET", "/secret", &[], b"").problem(404, "not_found");
+    let job = server.post("/v1/jobs", b"secret").header("location").unwrap().to_owned();
+    server.request("GET", &job, &["Prefer: wait=30"], b"");
+    let answer = server.get("/v1/status");
+    assert_eq!((answer.status, answer.header("cache-control")), (200, Some("no-store")));
+    assert!(!String::from_utf8_lossy(&answer.body).contains("secret"));
+    let (status, values) = (answer.json(), scrape(&server));
+    let mut compared = 0;
+    let mut agree = |name: String, number: &serde_json::Value| {
+        assert_eq!(number.as_f64(), Some(values[&name]), "{name}");
+        compared += 1;
+    };
+    for queue in status["queue"].as_array().unwrap() {
+        agree(format!("meshsnap_queue_jobs{{class={}}}", queue["class"].as_str().unwrap()), &queue["queued"]);
+    }
+    for (key, metric) in [
+        ("workers", "meshsnap_workers{state="),
+        ("kept", "meshsnap_kept_entries{account="),
+        ("pictures", "meshsnap_pictures_total{outcome="),
+    ] {
+        for (label, number) in status[key].as_object().unwrap() {
+            agree(format!("{metric}{label}}}"), number);
+        }
+    }
+    for account in status["memory"]["accounts"].as_array().unwrap() {
+        let label = account["account"].as_str().unwrap();
+        agree(format!("meshsnap_memory_limit_bytes{{account={label}}}"), &account["limit_bytes"]);
+    }
+    assert!(compared > 12, "{compared}");
+    assert_eq!((&status["pictures"]["miss"], &status["pictures"]["hit"]), (&1.into(), &2.into()));
+    let failures = status["failures"].as_array().unwrap().iter();
+    let failures: Vec<_> = failures
+        .map(|f| {
+            (f["place"].as_str().unwrap(), f["status"].as_u64(), f["code"].as_str().unwrap(), f["count"].as_u64().unwrap())
+        })
+        .collect();
+    let want = [
+        ("job", None, "mesh_unrecognised", 1),
+        ("other elsewhere", Some(404), "not_found", 1),
+        ("POST /v1/render", Some(400), "unknown_key", 3),
+    ];
+    assert_eq!(failures, want);
+}
+
+#[test]
+fn the_status_is_for_administrators() {
+    let keys = tempfile::NamedTempFile::new().unwrap();
+    let digest = |key: &str| meshsnap_server::digest::Digest::of(key.as_bytes()).to_string();
+    let line = |name: &str, key: &str, scopes: &str| {
+        format!("[[keys]]\nname = \"{name}\"\nsha256 = \"{}\"\nscopes = {scopes}\n", digest(key))
+    };
+    let text = line("boss", "one", "[\"admin\"]") + &line("ci", "two", "[\"render\", \"store\", \"metrics\"]");
+    std::fs::write(keys.path(), text).unwrap();
+    let mut command = meshsnap();
+    command.args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu", "--api-keys-file"]).arg(keys.path());
+    let server = Server::start_with(&mut command);
+    let ask = |key: &str| server.request("GET", "/v1/status", &[&format!("Authorization: Bearer {key}")], b"");
+    assert_eq!(ask("one").status, 200);
+    ask("two").problem(403, "scope_missing");
+    server.get("/v1/status").problem(401, "unauthorized");
+}

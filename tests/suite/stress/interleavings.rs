@@ -65,6 +65,7 @@ impl Process {
             memory: memory.clone(),
             storage: None,
             metrics: None,
+            code_of: |_| "failed",
             webhooks: None,
         };
         let renderers = pipeline_renderers(gpu, threads, Limits::default(), residents.clone());

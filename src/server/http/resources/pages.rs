@@ -36,11 +36,9 @@ Where keys are configured, add -H \"Authorization: Bearer $KEY\".
 
 /// The page on which a mesh is dropped, or the text. It needs no API key, because it is the same for all clients.
 pub async fn front(headers: HeaderMap) -> Response {
-    if wants_html(&headers) {
-        return FRONT.answer(&headers, "accept, host");
-    }
     let host = headers.get(header::HOST).and_then(|host| host.to_str().ok()).filter(|host| is_plain(host));
     let mut response = match host {
+        _ if wants_html(&headers) => FRONT.answer(&headers),
         Some(host) => text(host).answer(&headers),
         None => TEXT.answer(&headers),
     };
@@ -50,7 +48,7 @@ pub async fn front(headers: HeaderMap) -> Response {
 
 /// The page for operators. What it shows needs a key with the scope admin where keys are configured.
 pub async fn status(headers: HeaderMap) -> Response {
-    STATUS.answer(&headers, "accept-encoding")
+    STATUS.answer(&headers)
 }
 
 /// A page, and the policy that lets the browser run its own script and use its own style, and nothing else.
@@ -72,11 +70,10 @@ impl Page {
         Self { document: StaticDocument::new(html, "text/html; charset=utf-8"), policy }
     }
 
-    fn answer(&self, headers: &HeaderMap, vary: &'static str) -> Response {
+    fn answer(&self, headers: &HeaderMap) -> Response {
         let mut response = self.document.answer(headers);
         response.headers_mut().extend([
             (header::CONTENT_SECURITY_POLICY, self.policy.clone()),
-            (header::VARY, HeaderValue::from_static(vary)),
             // An address may have a signature.
             (HeaderName::from_static("referrer-policy"), HeaderValue::from_static("no-referrer")),
         ]);

@@ -1,5 +1,5 @@
 //! HTML pages in headless Chromium, checked for accessibility by axe-core, at two widths, light and
-//! dark: the reports of `meshsnap check`, and the server's page at `/`.
+//! dark: the reports of `meshsnap check`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,6 @@ use std::process::{Command, Stdio};
 use serde_json::Value;
 
 use super::super::check::{check, folder};
-use crate::support::server::Server;
 use crate::support::skip::{Need, skip};
 
 /// Widths of a phone and of a desk.
@@ -94,14 +93,7 @@ fn pages() -> Vec<(&'static str, String)> {
         assert!(changed.contains(part), "{part}: {changed}");
     }
     let ok = run(&["parts/good.obj", "--rules", "watertight"]);
-    vec![("what has changed", changed), ("no fault", ok), ("the server's page", front_page())]
-}
-
-fn front_page() -> String {
-    let server = Server::start(&[]);
-    let answer = server.request("GET", "/", &["Accept: text/html"], b"");
-    assert_eq!(answer.status, 200);
-    String::from_utf8(answer.body).unwrap()
+    vec![("what has changed", changed), ("no fault", ok)]
 }
 
 #[test]
@@ -124,5 +116,5 @@ fn pages_have_no_fault_of_accessibility() {
         let found = found(&browser, &axe, &wrong, WIDTHS_PX[0], false);
         assert_eq!(found["violations"][0][0], "html-has-lang", "{found}");
     }
-    assert_eq!(count, 12);
+    assert_eq!(count, 8);
 }

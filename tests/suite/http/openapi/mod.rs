@@ -56,7 +56,7 @@ fn the_document_is_whole_and_served_to_everybody() {
     let operations =
         document["paths"].as_object().unwrap().values().flat_map(|item| item.as_object().unwrap().values());
     let ids: Vec<&str> = operations.filter_map(|operation| operation["operationId"].as_str()).collect();
-    assert_eq!((ids.len(), ids.iter().collect::<BTreeSet<_>>().len()), (21, 21));
+    assert_eq!((ids.len(), ids.iter().collect::<BTreeSet<_>>().len()), (23, 23));
 
     let mut command = meshsnap();
     command.args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu"]).env("MESHSNAP_API_KEYS", "one");
@@ -95,7 +95,7 @@ fn every_path_answers_to_the_methods_that_are_documented_and_to_no_others() {
         }
         assert_eq!(said, allowed, "{path}");
     }
-    assert_eq!(asked, 18 * METHODS.len());
+    assert_eq!(asked, 20 * METHODS.len());
 }
 
 /// Checks an answer's status, headers, type and JSON against the document.
@@ -230,9 +230,12 @@ fn answers_are_as_documented() {
     ask("GET", "/v1/jobs/{id}", "/v1/jobs/x", &[], b"", 404);
     ask("DELETE", mesh, &cube, &[], b"", 204);
     ask("DELETE", mesh, &cube, &[], b"", 404);
-    for path in ["/", "/metrics", "/v1/schema", "/v1/capabilities", "/healthz", "/readyz", "/version", "/openapi.json"]
-    {
+    for path in ["/", "/status", "/metrics", "/v1/schema", "/v1/capabilities", "/v1/status", "/healthz", "/readyz"] {
         ask("GET", path, path, &[], b"", 200);
     }
-    assert_eq!(cases, 69);
+    for path in ["/version", "/openapi.json"] {
+        ask("GET", path, path, &[], b"", 200);
+    }
+    ask("GET", "/", "/", &["Accept: text/html"], b"", 200);
+    assert_eq!(cases, 72);
 }
