@@ -1,3 +1,4 @@
+import { signal } from "@preact/signals";
 import { isVec } from "./vector";
 import { touch } from "../picture/live";
 import { setKeys } from "../state/edit";
@@ -87,6 +88,14 @@ export async function pan(right: number, upwards: number): Promise<void> {
   if (placed) put(panned(placed, right, upwards, typeof fov === "number" ? fov : 35, upOf()));
 }
 
+/** The point that the camera was last sent to. */
+const faultTarget = signal<Vec | null>(null);
+
+/** True while the fault that was chosen is in the picture's middle. */
+export function isAtFault(): boolean {
+  return faultTarget.value !== null && String(look.value.keys["camera.target"]) === String(faultTarget.value);
+}
+
 /** Places the camera in front of a point, edge or face, from the side that faces outwards. */
 export function flyTo(points: Vec[]): void {
   const bounds = report.value?.bounds as { min: Vec; max: Vec } | null | undefined;
@@ -101,5 +110,6 @@ export function flyTo(points: Vec[]): void {
   const normal = a && b && c ? unit(cross(sub(b, a), sub(c, a))) : null;
   const eye = add(middle, scale(normal ?? outwards, far));
   const height = look.value.keys["camera.projection"] === "orthographic" ? far * 0.6 : null;
-  put({ eye: rounded(eye, far), target: rounded(middle, far * 0.01), height });
+  faultTarget.value = rounded(middle, far * 0.01);
+  put({ eye: rounded(eye, far), target: faultTarget.value, height });
 }

@@ -1,6 +1,7 @@
 import { signal, useSignalEffect } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { finished } from "../picture/live";
+import { mesh } from "../state/mesh";
 import { shownSize } from "../state/size";
 import { strings } from "../strings";
 import { besideFinished, besideShown, compare, divider, heat } from "./state";
@@ -66,12 +67,24 @@ function Heat() {
   return <canvas ref={canvas} class="shot heat" role="img" aria-label={strings.compare.heat} data-test="heat" />;
 }
 
+/** Names of the two sides, over the corners of the picture. */
+export function SideNames() {
+  const compared = compare.value;
+  if (!compared || heat.value) return null;
+  return (
+    <>
+      <span class="side-name is-left"><bdi>{compared.mesh?.name ?? strings.compare.kept}</bdi></span>
+      <span class="side-name is-right"><bdi>{compared.mesh ? mesh.value?.name : strings.compare.now}</bdi></span>
+    </>
+  );
+}
+
 /** What the heat picture says in figures. */
 export function HeatText() {
   const found = figures.value;
-  if (!heat.value || !found) return null;
-  if (found === "other") return <span class="figures">{strings.compare.differing}</span>;
+  if (!compare.value || !heat.value || !found) return null;
+  if (found === "other") return <span class="side-name is-left">{strings.compare.differing}</span>;
   const text = found.most === 0 ? strings.compare.same
     : strings.compare.figures(found.rmse.toFixed(2), found.most, (found.share * 100).toFixed(2));
-  return <span class="figures" data-test="heat-figures">{text}</span>;
+  return <span class="side-name is-left" data-test="heat-figures">{text}</span>;
 }

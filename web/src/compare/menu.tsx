@@ -2,12 +2,10 @@ import { useRef } from "preact/hooks";
 import { filesOfInput } from "../files/drop";
 import { store } from "../files/open";
 import { applyLook } from "../state/edit";
-import { mesh } from "../state/mesh";
 import { phase } from "../state/phase";
 import { strings } from "../strings";
 import type { NamedFile } from "../api/upload";
 import { compare, compareMesh, endCompare, heat, keepLook } from "./state";
-import { HeatText } from "./layer";
 
 /** Stores another mesh and shows it beside the one that is open. */
 export async function compareFiles(files: NamedFile[]): Promise<void> {
@@ -36,8 +34,6 @@ export function CompareMenu() {
   }
   return (
     <div class="group compare-menu">
-      <span class="label">{strings.compare.left}: <bdi>{compared.mesh?.name ?? strings.compare.kept}</bdi> · {strings.compare.right}: <bdi>{compared.mesh ? mesh.value?.name : strings.compare.now}</bdi></span>
-      <HeatText />
       <button type="button" aria-pressed={heat.value} onClick={() => (heat.value = !heat.value)} data-test="heat-toggle">{strings.compare.heat}</button>
       {!compared.mesh && <button type="button" data-test="compare-use" onClick={() => { applyLook("compare", compared.look); endCompare(); }}>{strings.compare.keep}</button>}
       <button type="button" onClick={endCompare} data-test="compare-end">{strings.compare.stop}</button>

@@ -1,6 +1,6 @@
 import { useEffect, useRef } from "preact/hooks";
-import { fit, showView, zoom } from "../camera/move";
-import { CompareLayer } from "../compare/layer";
+import { fit, isAtFault, showView, zoom } from "../camera/move";
+import { CompareLayer, HeatText, SideNames } from "../compare/layer";
 import { CompareMenu } from "../compare/menu";
 import { setKey } from "../state/edit";
 import { endStep, look } from "../state/history";
@@ -26,6 +26,9 @@ export function Stage() {
           <PictureImage />
           <CompareLayer />
         </div>
+        <SideNames />
+        <HeatText />
+        {isAtFault() && <span class="fault-mark" aria-hidden="true" data-test="fault-mark" />}
         {busy.value && <span class="progress" aria-hidden="true" />}
         <Messages />
       </div>
