@@ -57,7 +57,6 @@ export const strings = {
   lost: {
     heading: "The mesh is no longer on the server",
     text: (name: string) => `This link shows ${name}. Open that file again, and the same picture comes back.`,
-    other: "This is another file than the one of the link. Its picture is shown in the same look.",
   },
 
   key: {
@@ -104,7 +103,6 @@ export const strings = {
   looks: {
     styles: "Styles",
     presets: "Looks",
-    own: "Saved on the server",
     pick: (name: string) => `Show as ${name}`,
   },
 
@@ -147,7 +145,7 @@ export const strings = {
     shareHelp: "Copies a link to this page with the mesh, the view and all settings",
     download: "Download",
     size: "Size",
-    window: (size: string) => `Window, ${size}`,
+    window: (size: string) => `Window, ${size.replace("x", " × ")}`,
     custom: "Other…",
     customLabel: "Width and height in pixels, as 640x480",
     format: "Format",
@@ -159,7 +157,7 @@ export const strings = {
       command: "Command line",
       python: "Python",
       javascript: "JavaScript",
-      srcset: "<img srcset>",
+      srcset: "img srcset",
       markdown: "Markdown",
     },
     notes: {
@@ -218,11 +216,9 @@ export const strings = {
     left: "Left", right: "Right",
     divider: "Divider between the two pictures",
     heat: "Error heat",
-    sides: "Side by side",
     figures: (rmse: string, most: number, share: string) =>
       `RMSE ${rmse} / 255, largest difference ${most} / 255, ${share} % of the pixels differ`,
     same: "The two pictures are the same, pixel by pixel.",
-    swap: "Swap sides",
     keep: "Use the left look",
     kept: "kept look",
     now: "this look",

@@ -1,5 +1,5 @@
 import { address } from "./base";
-import { apiKey, forgetKey, needsKey } from "./key";
+import { apiKey, forgetKey, keyIsWrong, needsKey } from "./key";
 import type { Problem } from "./types";
 
 /** Refusal by the server, in its own words. */
@@ -42,6 +42,7 @@ export function refusalOf(status: number, title: string, text: string, retryAfte
     problem = { type: "urn:meshsnap:error:unknown", title, status, detail, code: "unknown", request_id: "" };
   }
   if (status === 401) {
+    keyIsWrong.value ||= apiKey.value !== null;
     forgetKey();
     needsKey.value = true;
   }

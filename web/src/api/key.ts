@@ -16,6 +16,9 @@ export const apiKey = signal<string | null>(stored());
 /** True while the server wants a key that the page does not have. */
 export const needsKey = signal(false);
 
+/** True after a key that the server has not taken. */
+export const keyIsWrong = signal(false);
+
 export function keepKey(key: string): void {
   try {
     sessionStorage.setItem(ITEM, key);
@@ -23,6 +26,7 @@ export function keepKey(key: string): void {
     // Without storage the key lasts until the page is left.
   }
   apiKey.value = key;
+  keyIsWrong.value = false;
   needsKey.value = false;
 }
 

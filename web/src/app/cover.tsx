@@ -1,5 +1,6 @@
 import { useRef } from "preact/hooks";
-import { keepKey, needsKey } from "../api/key";
+import { keepKey, keyIsWrong, needsKey } from "../api/key";
+import type { NamedFile } from "../api/upload";
 import { filesOfInput } from "../files/drop";
 import { cancelUpload, goOnWithKey, lastFiles, openFiles, openSample } from "../files/open";
 import { capabilities, mesh } from "../state/mesh";
@@ -76,18 +77,26 @@ function Refused() {
   const files = lastFiles();
   return (
     <div class="cover" data-test="refused">
-      <h2 class="title"><bdi>{strings.refused.heading(state.name)}</bdi></h2>
-      <p role="alert" class="refusal-text" data-test="refusal" data-code={state.code}>{state.detail}</p>
-      {state.flag && <p class="quiet">{strings.refused.flag(state.flag)}</p>}
-      {state.choices.length > 0 && files && <>
-        <p>{strings.refused.choose}</p>
-        <ul class="choices">{state.choices.slice(0, 100).map((path) => (
-          <li key={path}><button type="button" onClick={() => void openFiles(files, path)} data-test={`entry-${path}`}><bdi>{path}</bdi></button></li>
-        ))}</ul>
+      {state.choices.length > 0 && files ? <Choices paths={state.choices} files={files} /> : <>
+        <h2 class="title"><bdi>{strings.refused.heading(state.name)}</bdi></h2>
+        <p role="alert" class="refusal-text" data-test="refusal" data-code={state.code}>{state.detail}</p>
+        {state.flag && !state.detail.includes(state.flag) && <p class="quiet">{strings.refused.flag(state.flag)}</p>}
       </>}
       <Openers />
       {mesh.value && <button type="button" class="link" onClick={() => (phase.value = { kind: "open" })}>{strings.refused.back}</button>}
     </div>
+  );
+}
+
+/** The files among which one is to be chosen as the mesh. */
+function Choices({ paths, files }: { paths: string[]; files: NamedFile[] }) {
+  return (
+    <>
+      <h2 class="title">{strings.refused.choose}</h2>
+      <ul class="choices">{paths.slice(0, 100).map((path) => (
+        <li key={path}><button type="button" onClick={() => void openFiles(files, path)} data-test={`entry-${path}`}><bdi>{path}</bdi></button></li>
+      ))}</ul>
+    </>
   );
 }
 
@@ -116,6 +125,7 @@ function KeyForm() {
     <form class="cover" onSubmit={use} data-test="key-form">
       <h2 class="title">{strings.key.heading}</h2>
       <p class="quiet">{strings.key.text}</p>
+      {keyIsWrong.value && <p role="alert" class="refusal-text" data-test="key-wrong">{strings.key.wrong}</p>}
       <div class="openers">
         <label class="key-label">{strings.key.label} <input ref={input} type="password" autocomplete="off" data-test="key" /></label>
         <button type="submit" class="primary" data-test="key-use">{strings.key.save}</button>

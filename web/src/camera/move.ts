@@ -44,6 +44,17 @@ export function fit(): void {
   setKeys("fit", { ...NOT_PLACED, ...own, "camera.from_file": undefined, "camera.margin": undefined });
 }
 
+/** Fits the mesh if a placed camera, which may be of another mesh, looks past it. */
+export function fitIfAway(): void {
+  const placed = placedOf(look.value.keys);
+  const bounds = report.value?.bounds as { min: Vec; max: Vec } | null | undefined;
+  if (!placed || !bounds) return;
+  const middle = scale(add(bounds.min, bounds.max), 0.5);
+  const whole = length(sub(bounds.max, bounds.min));
+  const far = length(sub(placed.eye, placed.target));
+  if (length(sub(placed.target, middle)) > whole || far > whole * 50) fit();
+}
+
 /** Shows a named view, fitted. */
 export function showView(view: string): void {
   setKeys("view", { ...NO_ANGLES, ...NOT_PLACED, "camera.from_file": undefined, "camera.view": view });

@@ -32,11 +32,11 @@ export function FieldRow({ field, edit, explain }: { field: Field; edit: Edit; e
         <label for={id} id={`${id}-label`}>{label}{unit && <span class="unit"> {unit}</span>}</label>
         <button class="help" type="button" aria-expanded={open} aria-label={strings.controls.help(field.key)}
           onClick={() => (helpOf.value = open ? null : id)}>?</button>
-        {isSet && <button class="reset" type="button" title={strings.controls.reset(field.key)}
-          aria-label={strings.controls.reset(field.key)} data-test={`reset-${id}`}
-          onClick={() => { endStep(); edit.set(undefined); }}>↺</button>}
       </div>
       <Control field={field} edit={edit} id={id} />
+      {isSet && <button class="reset" type="button" title={strings.controls.reset(field.key)}
+        aria-label={strings.controls.reset(field.key)} data-test={`reset-${id}`}
+        onClick={() => { endStep(); edit.set(undefined); }}>↺</button>}
       {open && <p class="description" id={`${id}-help`}>{field.description} <code>{id}</code></p>}
       {refused && <p class="refusal" role="alert">{pictureRefusal.value?.message}</p>}
     </div>

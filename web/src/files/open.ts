@@ -2,6 +2,7 @@ import { effect } from "@preact/signals";
 import { isAbort, json, Refusal, request, Unreachable } from "../api/client";
 import type { Report } from "../api/types";
 import { type NamedFile, storeMesh } from "../api/upload";
+import { fitIfAway } from "../camera/move";
 import { finished, shown } from "../picture/live";
 import { queryOf } from "../state/look";
 import { capabilities, mesh, type OpenMesh, readingPairs, report } from "../state/mesh";
@@ -154,7 +155,11 @@ export function startRecovery(): void {
     if (!open) return;
     const query = queryOf(readingPairs(open));
     json<Report>(`v1/meshes/${open.sha256}${query ? `?${query}` : ""}`)
-      .then((found) => mesh.peek() === open && (report.value = found))
+      .then((found) => {
+        if (mesh.peek() !== open) return;
+        report.value = found;
+        if (open.files) fitIfAway();
+      })
       .catch(() => undefined);
   });
 }
