@@ -29,7 +29,7 @@ export function FieldRow({ field, edit, explain }: { field: Field; edit: Edit; e
   return (
     <div class={classes} data-test={`field-${id}`} data-key={id}>
       <div class="field-head">
-        <label for={id} id={`${id}-label`}>{label}{unit && <span class="unit"> {unit}</span>}</label>
+        <label for={id} id={`${id}-label`}>{label}{unit && <span class="unit">{unit === "°" ? unit : `\u00a0${unit}`}</span>}</label>
         <button class="help" type="button" aria-expanded={open} aria-label={strings.controls.help(field.key)}
           onClick={() => (helpOf.value = open ? null : id)}>?</button>
       </div>

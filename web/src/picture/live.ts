@@ -4,6 +4,7 @@ import { look } from "../state/history";
 import { mesh } from "../state/mesh";
 import { announcement, phase, pictureRefusal } from "../state/phase";
 import { format, pictureSize, shownSize, type Size, within } from "../state/size";
+import { scaledLook } from "../state/scaled";
 import { strings } from "../strings";
 import { PictureLoop, type Shown } from "./loop";
 
@@ -80,7 +81,8 @@ export function draftOf(picture: Picture): Picture {
   const size = within(picture.size, draftMost(picture.size));
   const keys = { ...picture.look.keys };
   if (!("image.samples" in keys) && !("image.max_error" in keys)) keys["image.samples"] = 4;
-  return { ...picture, look: { ...picture.look, keys }, size, format: "webp" };
+  const look = scaledLook({ ...picture.look, keys }, size.width / picture.size.width);
+  return { ...picture, look, size, format: "webp" };
 }
 
 function draftMost(size: Size): number {

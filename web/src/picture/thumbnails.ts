@@ -4,6 +4,7 @@ import { picturePath } from "../state/address";
 import { look } from "../state/history";
 import { effective, isView, type Look } from "../state/look";
 import { capabilities, mesh } from "../state/mesh";
+import { scaledLook } from "../state/scaled";
 import { busy, finished, moving } from "./live";
 import { PRESETS } from "./presets";
 
@@ -18,6 +19,9 @@ export const thumbnails = signal<Readonly<Record<string, string>>>({});
 export const savedPresets = signal<Offer[]>([]);
 
 const SIDE_PX = Math.round(88 * Math.min(2, Math.max(1, window.devicePixelRatio || 1)));
+
+/** Lines of thumbnails against those of the picture: finer, but not so fine that they vanish. */
+const LINE_SHARE = 0.4;
 
 export function styleOffers(): Offer[] {
   return (capabilities.value?.styles ?? []).map((style) => ({
@@ -36,7 +40,7 @@ export function presetOffers(): Offer[] {
 function small(own: Look): Look {
   const view = Object.entries(look.peek().keys).filter(([key]) => isView(key) || key === "camera.up" || key === "scene.time_s");
   const keys = { ...own.keys, ...Object.fromEntries(view) };
-  return effective({ keys, materials: own.materials });
+  return scaledLook(effective({ keys, materials: own.materials }), LINE_SHARE);
 }
 
 let round = 0;
