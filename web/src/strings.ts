@@ -79,6 +79,7 @@ export const strings = {
     stage: "Picture. Arrow keys turn it, plus and minus zoom, 0 fits it.",
     hint: "Drag to turn, wheel to zoom, Shift and drag to move, double click to fit",
     refused: "The server refused this picture",
+    showKey: (key: string) => `Go to ${key}`,
     zoomIn: "Zoom in",
     zoomOut: "Zoom out",
     fit: "Fit",
@@ -171,6 +172,7 @@ export const strings = {
       srcset: "For pages, with a sharper picture for dense screens.",
       markdown: "For documents and comments.",
     },
+    signedNote: "Shows this picture to everyone, without a key, for a day.",
     keyNote: "MESHSNAP_KEY stands for your key.",
   },
 

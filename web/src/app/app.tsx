@@ -18,14 +18,8 @@ import { strings } from "../strings";
 import { Cover } from "./cover";
 import { Header } from "./header";
 import { Notices } from "./notices";
+import { narrow, narrowQuery, tab, TABS } from "./tab";
 
-const TABS = ["looks", "settings", "materials", "report", "explain", "copy"] as const;
-type Tab = (typeof TABS)[number];
-
-/** True where one panel shows at a time; looks then come first. */
-const narrowQuery = matchMedia("(max-width: 860px)");
-const narrow = signal(narrowQuery.matches);
-const tab = signal<Tab>(narrow.value ? "looks" : "settings");
 const dropping = signal(false);
 
 export function App() {

@@ -8,6 +8,7 @@ import { strings } from "../strings";
 import { ColourInput } from "./colour";
 import { labelOf, rangeOf } from "./ranges";
 import type { Field } from "./schema";
+import { SectionPlanes } from "./section-planes";
 
 export interface Edit {
   value: Value | undefined;
@@ -50,6 +51,7 @@ interface Props {
 }
 
 function Control(props: Props) {
+  if (props.field.key === "scene.section") return <SectionPlanes edit={props.edit} id={props.id} />;
   switch (props.field.kind) {
     case "choice": return <Choice {...props} />;
     case "boolean": return <Switch {...props} />;

@@ -46,7 +46,7 @@ export interface Section {
 }
 
 /** Keys that the page has controls of its own for, or that only a body can have. */
-const OWN = new Set(["mesh", "materials", "style", "image.width", "image.height", "image.format"]);
+const OWN = new Set(["$schema", "mesh", "materials", "style", "image.width", "image.height", "image.format"]);
 
 /** Sections whose presence draws something. */
 const LAYERS = new Set(["surface", "wire", "outline", "topology", "sheet"]);

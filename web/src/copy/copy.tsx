@@ -1,15 +1,30 @@
-import { signal } from "@preact/signals";
+import { signal, useSignalEffect } from "@preact/signals";
 import { apiKey } from "../api/key";
 import { finished, wanted } from "../picture/live";
 import { capabilities, stem } from "../state/mesh";
+import { pictureAddress } from "../state/address";
 import { announcement } from "../state/phase";
 import { chosenSize, extension, type Format, format, pictureSize, readSize, sizeText } from "../state/size";
 import { strings } from "../strings";
 import { KINDS, type LineKind, lineOf } from "./lines";
+import { signedAndTried } from "./sign";
 
 const kind = signal<LineKind>("url");
 const copied = signal<string | null>(null);
 const custom = signal(false);
+
+/** The signed address of the finished picture, where the page's key makes one. */
+const signedAddress = signal<string | null>(null);
+
+function signWhenAsked(): void {
+  signedAddress.value = null;
+  const key = apiKey.value;
+  const picture = finished.value?.picture;
+  if (kind.value !== "signed" || !key || !picture) return;
+  const url = pictureAddress(picture);
+  const isNewest = () => finished.peek()?.picture === picture && kind.peek() === "signed";
+  signedAndTried(url, key).then((made) => isNewest() && (signedAddress.value = made)).catch(() => undefined);
+}
 
 const SIZES = ["256", "512", "1024", "800x600", "1280x720", "1920x1080"];
 
@@ -26,11 +41,13 @@ export async function copyText(text: string, what: string): Promise<void> {
 }
 
 export function CopyPanel() {
+  useSignalEffect(signWhenAsked);
   const picture = wanted.value;
   if (!picture) return null;
   const limit = capabilities.value?.limits?.image_px ?? 4096;
   const keyed = apiKey.value !== null;
-  const text = lineOf(kind.value, picture, { keyed, limit });
+  const signedText = kind.value === "signed" ? signedAddress.value : null;
+  const text = signedText ?? lineOf(kind.value, picture, { keyed, limit });
   const withKey = keyed && ["curl", "python", "javascript"].includes(kind.value);
   return (
     <section class="copy" aria-label={strings.copy.heading}>
@@ -48,7 +65,7 @@ export function CopyPanel() {
         <button type="button" class="primary" data-test="copy" onClick={() => void copyText(text, "line")}>
           {copied.value === "line" ? strings.copy.copied : strings.copy.copy}</button>
       </div>
-      <p class="quiet">{copied.value === "line-failed" ? strings.copy.failed : strings.copy.notes[kind.value]}
+      <p class="quiet">{copied.value === "line-failed" ? strings.copy.failed : signedText ? strings.copy.signedNote : strings.copy.notes[kind.value]}
         {withKey && ` ${strings.copy.keyNote}`}</p>
     </section>
   );

@@ -1,5 +1,6 @@
 import { useEffect, useRef } from "preact/hooks";
 import { fit, isAtFault, showView, zoom } from "../camera/move";
+import { showKey } from "../app/tab";
 import { CompareLayer, HeatText, SideNames } from "../compare/layer";
 import { CompareMenu } from "../compare/menu";
 import { setKey } from "../state/edit";
@@ -101,6 +102,7 @@ function Messages() {
     <div class="message is-refusal" role="alert" data-test="picture-refusal">
       <strong>{strings.picture.refused}</strong>
       <span>{refusal.message}</span>
+      {refusal.key && <button type="button" class="small" onClick={() => showKey(refusal.key!)} data-test="show-key">{strings.picture.showKey(refusal.key)}</button>}
     </div>
   );
 }
