@@ -25,6 +25,11 @@ export const strings = {
 
   open: {
     heading: "Drop a mesh here",
+    what: "The server draws it. Turn it, choose a look, and copy the address, the command or the code that gives the same picture.",
+    without: "Or without this page:",
+    curl: (render: string) => `curl --data-binary @mesh.obj '${render}?style=wire' -o out.png`,
+    interface: "Description of the interface",
+    schema: "Schema of the request",
     formats: (names: string[]) => `${names.map((n) => n.toUpperCase()).join(", ")}, or a zip of one with its textures`,
     files: "Choose files",
     folder: "Choose a folder",
@@ -146,6 +151,7 @@ export const strings = {
     shareHelp: "Copies a link to this page with the mesh, the view and all settings",
     download: "Download",
     size: "Size",
+    windowAlone: "Window",
     window: (size: string) => `Window, ${size.replace("x", " × ")}`,
     custom: "Other…",
     customLabel: "Width and height in pixels, as 640x480",
@@ -172,6 +178,7 @@ export const strings = {
       srcset: "For pages, with a sharper picture for dense screens.",
       markdown: "For documents and comments.",
     },
+    keyedNote: "This server asks for keys. Where none can be sent, take the signed URL.",
     signedNote: "Shows this picture to everyone, without a key, for a day.",
     keyNote: "MESHSNAP_KEY stands for your key.",
   },

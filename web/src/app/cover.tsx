@@ -1,4 +1,5 @@
 import { useRef } from "preact/hooks";
+import { address } from "../api/base";
 import { keepKey, keyIsWrong, needsKey } from "../api/key";
 import type { NamedFile } from "../api/upload";
 import { filesOfInput } from "../files/drop";
@@ -24,12 +25,18 @@ export function Cover() {
 function Empty() {
   const formats = capabilities.value?.mesh_formats ?? ["obj", "gltf", "glb", "stl", "ply"];
   return (
-    <div class="cover" data-test="empty">
+    <div class="cover is-empty" data-test="empty">
       <DropMark />
       <h2 class="title">{strings.open.heading}</h2>
-      <p>{strings.open.formats(formats)}. {capabilities.value && strings.open.limit(capabilities.value.limits.body_bytes)}</p>
+      <p>{strings.open.what}</p>
       <Openers />
+      <p class="quiet">{strings.open.formats(formats)}. {capabilities.value && strings.open.limit(capabilities.value.limits.body_bytes)}</p>
       <p class="quiet">{strings.open.privacy(location.host)}</p>
+      <div class="without">
+        <span class="quiet">{strings.open.without}</span>
+        <pre tabIndex={0} data-test="curl">{strings.open.curl(address("v1/render"))}</pre>
+        <p class="quiet"><a href={address("openapi.json")}>{strings.open.interface}</a> · <a href={address("v1/schema")}>{strings.open.schema}</a> · <a href={address("status")}>{strings.status.title}</a></p>
+      </div>
     </div>
   );
 }

@@ -66,7 +66,8 @@ export function CopyPanel() {
           {copied.value === "line" ? strings.copy.copied : strings.copy.copy}</button>
       </div>
       <p class="quiet">{copied.value === "line-failed" ? strings.copy.failed : signedText ? strings.copy.signedNote : strings.copy.notes[kind.value]}
-        {withKey && ` ${strings.copy.keyNote}`}</p>
+        {withKey && ` ${strings.copy.keyNote}`}
+        {keyed && ["url", "srcset", "markdown"].includes(kind.value) && ` ${strings.copy.keyedNote}`}</p>
     </section>
   );
 }
@@ -85,7 +86,7 @@ function OutputControls() {
     <>
       <label>{strings.copy.size}
         <select value={value} data-test="size" onChange={(e) => pick(e.currentTarget.value)}>
-          <option value="window">{strings.copy.window(sizeText(chosenSize.value ? { width: 0, height: 0 } : pictureSize.value).replace(/^0$/, "…"))}</option>
+          <option value="window">{chosenSize.value || !wanted.value ? strings.copy.windowAlone : strings.copy.window(sizeText(wanted.value.size))}</option>
           {[...SIZES, ...own].map((size) => <option key={size} value={size}>{size.replace("x", " × ")}</option>)}
           <option value="custom">{strings.copy.custom}</option>
         </select>

@@ -1,9 +1,10 @@
 import { computed, effect, signal } from "@preact/signals";
 import type { Picture } from "../state/address";
 import { look } from "../state/history";
-import { mesh } from "../state/mesh";
+import type { Keys } from "../state/look";
+import { capabilities, mesh } from "../state/mesh";
 import { announcement, phase, pictureRefusal } from "../state/phase";
-import { format, pictureSize, shownSize, type Size, within } from "../state/size";
+import { chosenSize, format, pictureSize, shownSize, type Size, within } from "../state/size";
 import { scaledLook } from "../state/scaled";
 import { strings } from "../strings";
 import { PictureLoop, type Shown } from "./loop";
@@ -73,13 +74,25 @@ export const loop = new PictureLoop({
 export const wanted = computed<Picture | null>(() => {
   if (!mesh.value || phase.value.kind !== "open") return null;
   if (pictureSize.value.width < 2) return null;
-  return { mesh: mesh.value, look: look.value, size: pictureSize.value, format: format.value };
+  const size = chosenSize.value ? pictureSize.value : roomForTurns(pictureSize.value, look.value.keys);
+  return { mesh: mesh.value, look: look.value, size, format: format.value };
 });
+
+/** The size of a turntable's frames: all of them together have at most the pixels of the largest picture. */
+function roomForTurns(size: Size, keys: Keys): Size {
+  const turns = keys["sheet.turntable"];
+  if (typeof turns !== "number" || "sheet.columns" in keys) return size;
+  const most = (capabilities.value?.limits?.image_px ?? 4096) ** 2;
+  const share = Math.sqrt(most / (turns * (size.width + 1) * (size.height + 1)));
+  return within(size, Math.floor(Math.max(size.width, size.height) * Math.min(1, share)));
+}
 
 /** A small picture of the same: quick to draw, with the same proportions. */
 export function draftOf(picture: Picture): Picture {
   const size = within(picture.size, draftMost(picture.size));
   const keys = { ...picture.look.keys };
+  // One view of a turntable is enough while it is turned.
+  if ("sheet.turntable" in keys) for (const key of Object.keys(keys)) if (/^sheet\b/.test(key)) delete keys[key];
   if (!("image.samples" in keys) && !("image.max_error" in keys)) keys["image.samples"] = 4;
   const look = scaledLook({ ...picture.look, keys }, size.width / picture.size.width);
   return { ...picture, look, size, format: "webp" };

@@ -12,6 +12,7 @@ export const PRESETS: { name: string; look: Look }[] = [
   { name: "curvature", look: of({ "surface.debug": "curvature", "image.legend": true }) },
   { name: "orientation", look: of({ "surface.debug": "face-orientation" }) },
   { name: "four views", look: of({ "style": "technical", "sheet.labels": true, "camera.projection": "orthographic" }) },
+  { name: "turntable", look: of({ "sheet.turntable": 16 }) },
 ];
 
 function of(keys: Look["keys"]): Look {

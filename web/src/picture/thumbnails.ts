@@ -2,7 +2,7 @@ import { effect, signal } from "@preact/signals";
 import { request } from "../api/client";
 import { picturePath } from "../state/address";
 import { look } from "../state/history";
-import { effective, isView, type Look } from "../state/look";
+import { effective, isView, type Look, type Value } from "../state/look";
 import { capabilities, mesh } from "../state/mesh";
 import { scaledLook } from "../state/scaled";
 import { busy, finished, moving } from "./live";
@@ -39,7 +39,9 @@ export function presetOffers(): Offer[] {
 /** The look of a thumbnail: an offer from the direction of now, small, with the whole mesh in sight. */
 function small(own: Look): Look {
   const view = Object.entries(look.peek().keys).filter(([key]) => isView(key) || key === "camera.up" || key === "scene.time_s");
-  const keys = { ...own.keys, ...Object.fromEntries(view) };
+  const keys: Record<string, Value> = { ...own.keys, ...Object.fromEntries(view) };
+  // A grid in place of an animation, which would draw the eye away from the picture.
+  if (typeof keys["sheet.turntable"] === "number") Object.assign(keys, { "sheet.turntable": 4, "sheet.columns": 2 });
   return scaledLook(effective({ keys, materials: own.materials }), LINE_SHARE);
 }
 
