@@ -9,8 +9,8 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 use axum::response::Response;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use sha2::{Digest as _, Sha256};
 
+use crate::digest::Digest;
 use crate::http::static_document::StaticDocument;
 
 static FRONT: LazyLock<Page> = LazyLock::new(|| Page::new(include_str!("../../page/index.html")));
@@ -84,7 +84,7 @@ impl Page {
 /// The source of the policy for the element of a page between a tag and its end: the hash of its text.
 fn hash_of(html: &str, (tag, end): (&str, &str)) -> String {
     let text = html.split_once(tag).and_then(|(_, rest)| rest.split_once(end));
-    text.map_or_else(|| "'none'".to_owned(), |(text, _)| format!("'sha256-{}'", STANDARD.encode(Sha256::digest(text))))
+    text.map_or_else(|| "'none'".to_owned(), |(text, _)| format!("'sha256-{}'", STANDARD.encode(Digest::of(text.as_bytes()).as_bytes())))
 }
 
 /// True for a browser that opens a page.
