@@ -12,25 +12,37 @@ export function opaque(colour: string): string {
   return /^[0-9a-f]{6}/i.test(digits) ? `#${digits.slice(0, 6)}` : "#808080";
 }
 
+interface Props {
+  id: string;
+  edit: Edit;
+  fallback: unknown;
+  /** True for keys whose null draws nothing. */
+  mayBeNone: boolean;
+}
+
 /** A colour: the browser's picker, text for all that the key takes, and swatches. */
-export function ColourInput({ id, edit, fallback }: { id: string; edit: Edit; fallback: unknown }) {
-  const stated = edit.value ?? fallback;
+export function ColourInput({ id, edit, fallback, mayBeNone }: Props) {
+  const stated = edit.value === undefined ? fallback : edit.value;
   const text = typeof stated === "string" ? stated : "";
+  const none = strings.controls.noColour;
   const pick = (colour: string) => {
     endStep();
-    edit.set(colour);
+    if (colour === "") edit.set(undefined);
+    else edit.set(mayBeNone && colour === none ? null : colour);
   };
   return (
     <div class="colour">
       <input type="color" value={opaque(text || "#808080")} class={text ? "" : "is-unset"} aria-label={strings.controls.picker(id)}
         onInput={(e) => { touch(); edit.set(e.currentTarget.value); }} />
-      <input type="text" id={id} value={edit.value === null ? "" : text} placeholder={strings.controls.byDefault} spellcheck={false}
+      <input type="text" id={id} value={edit.value === null ? none : text} placeholder={mayBeNone ? none : strings.controls.byDefault} spellcheck={false}
         onChange={(e) => pick(e.currentTarget.value.trim())} />
       <span class="swatches">
         {SWATCHES.map((colour) => (
           <button type="button" key={colour} class={`swatch s${colour.slice(1)}`} title={colour} tabIndex={-1}
             aria-label={strings.controls.swatch(id, colour)} onClick={() => pick(colour)} />
         ))}
+        {mayBeNone && <button type="button" class="small" aria-pressed={edit.value === null} onClick={() => pick(none)}
+          data-test={`none-${id}`}>{none}</button>}
       </span>
     </div>
   );

@@ -1,6 +1,6 @@
 import { signal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
-import { hold } from "../picture/live";
+import { hold, touch } from "../picture/live";
 import { endStep } from "../state/history";
 import type { Value } from "../state/look";
 import { refusedKey, pictureRefusal } from "../state/phase";
@@ -56,7 +56,7 @@ function Control(props: Props) {
     case "choice": return <Choice {...props} />;
     case "boolean": return <Switch {...props} />;
     case "number": return <Numeric {...props} />;
-    case "colour": return <ColourInput id={props.id} edit={props.edit} fallback={props.field.default} />;
+    case "colour": return <ColourInput id={props.id} edit={props.edit} fallback={props.field.default} mayBeNone={props.field.section === "topology"} />;
     case "list": return <Several {...props} />;
     default: return <TextInput {...props} />;
   }
@@ -117,9 +117,19 @@ function Numeric({ field, edit, id }: Props) {
       <input type="text" id={id} inputMode="decimal"
         placeholder={number === null ? hint : ""}
         value={edit.value === undefined || edit.value === null ? String(number ?? (field.words[0] ?? "")) : String(edit.value)}
-        onFocus={endStep} onChange={(e) => put(e.currentTarget.value.trim())} />
+        onFocus={endStep} onChange={(e) => put(e.currentTarget.value.trim())}
+        onKeyDown={(e) => stepByKey(e, number ?? range?.min ?? 0, range?.step ?? 1, put)} />
     </div>
   );
+}
+
+/** Up and down change a number by a step, or by ten with Shift, within the slider's precision. */
+function stepByKey(event: KeyboardEvent, from: number, step: number, put: (text: string) => void): void {
+  const sign = event.key === "ArrowUp" ? 1 : event.key === "ArrowDown" ? -1 : 0;
+  if (sign === 0) return;
+  event.preventDefault();
+  touch();
+  put(String(Number((from + sign * step * (event.shiftKey ? 10 : 1)).toPrecision(8))));
 }
 
 function Several({ field, edit, id }: Props) {

@@ -1,3 +1,5 @@
+import { look } from "../state/history";
+import { report } from "../state/mesh";
 import type { Field } from "./schema";
 
 /**
@@ -30,10 +32,20 @@ export interface Range {
 
 /** The slider's range; null where none makes sense. */
 export function rangeOf(field: Field): Range | null {
+  if (field.key === "outline.thickness" && look.value.keys["outline.unit"] !== "px") return inModelUnits();
   const useful = USEFUL[field.name];
   const [min, max] = useful ?? [field.min, field.max];
   if (min === null || max === null || (!useful && max - min > WIDE)) return null;
   return { min: Math.max(min, field.min ?? min), max: Math.min(max, field.max ?? max), step: stepOf(field, max - min) };
+}
+
+/** Thicknesses in model units: up to a twentieth of the mesh. */
+function inModelUnits(): Range | null {
+  const size = (report.value?.bounds as { size?: number[] } | null | undefined)?.size;
+  const longest = Math.max(0, ...(size ?? []));
+  if (longest === 0) return null;
+  const step = 10 ** Math.floor(Math.log10(longest / 500));
+  return { min: 0, max: Number((longest / 20).toPrecision(2)), step };
 }
 
 function stepOf(field: Field, wide: number): number {

@@ -3,8 +3,9 @@ import { fit, isAtFault, showView, zoom } from "../camera/move";
 import { showKey } from "../app/tab";
 import { CompareLayer, HeatText, SideNames } from "../compare/layer";
 import { CompareMenu } from "../compare/menu";
+import { compare } from "../compare/state";
 import { setKey } from "../state/edit";
-import { endStep, look } from "../state/history";
+import { canUndo, endStep, look } from "../state/history";
 import { mesh } from "../state/mesh";
 import { connection, pictureRefusal } from "../state/phase";
 import { room, shownSize } from "../state/size";
@@ -23,10 +24,11 @@ export function Stage() {
       <Toolbar />
       <div class="frame" ref={frame}>
         <div class="picture" ref={picture} tabIndex={0} role="application" aria-label={strings.picture.stage}
-          aria-busy={busy.value} data-test="stage" title={strings.picture.hint}>
+          aria-busy={busy.value} data-test="stage">
           <PictureImage />
           <CompareLayer />
         </div>
+        <Hint />
         <SideNames />
         <HeatText />
         {isAtFault() && <span class="fault-mark" aria-hidden="true" data-test="fault-mark" />}
@@ -63,6 +65,14 @@ function PictureImage() {
   return <img ref={box} class={`shot ${transparent ? "is-transparent" : ""}`} src={current.url} draggable={false}
     alt={strings.picture.alt(current.picture.mesh.name, style)} data-test="picture" data-draft={current.draft}
     data-path={current.path} data-finished={finished.value?.path} />;
+}
+
+/** How the picture is turned, until it has been turned once. */
+function Hint() {
+  const keys = look.value.keys;
+  if (canUndo.value || "camera.azimuth_deg" in keys || "camera.eye" in keys || compare.value) return null;
+  const text = matchMedia("(hover: none)").matches ? strings.picture.touchHint : strings.picture.hint;
+  return <span class="hint" aria-hidden="true">{text}</span>;
 }
 
 const VIEWS = ["iso", "front", "back", "left", "right", "top", "bottom"] as const;

@@ -4,23 +4,24 @@ import type { Verdict } from "../api/types";
 import { flyTo } from "../camera/move";
 import type { Vec } from "../camera/vector";
 import { queryOf } from "../state/look";
-import { mesh, readingPairs, type OpenMesh } from "../state/mesh";
+import { capabilities, mesh, readingPairs, type OpenMesh } from "../state/mesh";
 import { endStep } from "../state/history";
 import { strings } from "../strings";
 
 type Check = Verdict["checks"][number];
 
-const RULES = "watertight,manifold,consistent-winding,no-degenerate,no-duplicate-faces,no-loose-vertices,no-inverted-volume";
+const STANDARD = "watertight,manifold,consistent-winding,no-degenerate,no-duplicate-faces,no-loose-vertices,no-inverted-volume";
 const FAULTS_SHOWN = 20;
 
 const words = strings.report;
+const rules = signal(STANDARD);
 const verdict = signal<{ of: OpenMesh; checks: Check[] } | { of: OpenMesh; failed: string } | null>(null);
 /** The fault that the camera looks at. */
 const current = signal<string | null>(null);
 
 async function check(of: OpenMesh): Promise<void> {
   try {
-    const query = queryOf([...readingPairs(of), ["rules", RULES]]);
+    const query = queryOf([...readingPairs(of), ["rules", rules.peek()]]);
     const { checks } = await postJson<Verdict>(`v1/check?${query}`, { mesh: of.sha256 });
     if (mesh.peek() === of) verdict.value = { of, checks };
   } catch (error) {
@@ -34,15 +35,37 @@ export function Checks() {
     const open = mesh.value;
     if (open && verdict.peek()?.of !== open) void check(open);
   });
+  return <><Verdicts /><Rules /></>;
+}
+
+function Verdicts() {
   const found = verdict.value;
   if (!found || found.of !== mesh.value) return <p class="quiet">{words.checking}</p>;
-  if ("failed" in found) return <p class="quiet">{found.failed}</p>;
+  if ("failed" in found) return <p class="refusal-text" role="alert">{found.failed}</p>;
   const anyPlaces = found.checks.some(({ where }) => where.length > 0);
   return (
     <>
       {anyPlaces && <p class="quiet">{words.faults}</p>}
       <ul class="checks">{found.checks.map((one) => <CheckItem key={one.rule} check={one} />)}</ul>
     </>
+  );
+}
+
+/** The rules that are checked, to be changed. */
+function Rules() {
+  const known = capabilities.value?.check_rules ?? [];
+  const change = (text: string) => {
+    rules.value = text.replace(/\s+/g, "") || STANDARD;
+    verdict.value = null;
+    if (mesh.value) void check(mesh.value);
+  };
+  return (
+    <details class="rules">
+      <summary>{words.rules}</summary>
+      <textarea rows={3} aria-label={words.rules} spellcheck={false} value={rules.value.replaceAll(",", ", ")}
+        onChange={(e) => change(e.currentTarget.value)} data-test="rules" />
+      <p class="quiet">{words.knownRules(known)}</p>
+    </details>
   );
 }
 

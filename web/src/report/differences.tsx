@@ -9,7 +9,7 @@ import { strings } from "../strings";
 
 const words = strings.compare;
 const result = signal<{ key: string; difference: Difference | null; failed: string | null } | null>(null);
-const picture = signal<string | null>(null);
+const picture = signal<{ url: string } | "drawing" | { failed: string } | null>(null);
 
 function sides(): { a: string; b: string } | null {
   const [a, b] = [compare.value?.mesh?.sha256, mesh.value?.sha256];
@@ -29,12 +29,29 @@ async function differ(both: { a: string; b: string }): Promise<void> {
   }
 }
 
-/** The distances of both meshes as the server's picture. */
+/** Asks for the distances of both meshes as the server's picture. */
 async function draw(both: { a: string; b: string }): Promise<void> {
   const { azimuth, elevation } = angles();
   const query = `format=webp&size=960x480&camera.azimuth_deg=${azimuth}&camera.elevation_deg=${elevation}`;
   const init = { method: "POST", body: JSON.stringify(both), headers: { "Content-Type": "application/json" } };
-  picture.value = URL.createObjectURL(await (await request(`v1/diff?${query}`, init)).blob());
+  picture.value = "drawing";
+  try {
+    picture.value = { url: URL.createObjectURL(await (await request(`v1/diff?${query}`, init)).blob()) };
+  } catch (error) {
+    picture.value = { failed: error instanceof Error ? error.message : String(error) };
+  }
+}
+
+function DistancePicture({ both }: { both: { a: string; b: string } }) {
+  const state = picture.value;
+  if (state === "drawing") return <p class="quiet">{strings.loading}</p>;
+  if (state && "url" in state) return <img src={state.url} alt={words.heatPicture} data-test="distances" />;
+  return (
+    <>
+      {state && <p class="quiet">{state.failed}</p>}
+      <button type="button" class="small" onClick={() => void draw(both)} data-test="distance-picture">{words.heatPicture}</button>
+    </>
+  );
 }
 
 /** What differs between the two meshes that are compared. */
@@ -52,8 +69,7 @@ export function Differences() {
       {!found.difference && !found.failed && <p class="quiet">{strings.loading}</p>}
       {found.failed && <p class="quiet">{found.failed}</p>}
       {found.difference && <Summary difference={found.difference} />}
-      {picture.value ? <img src={picture.value} alt={words.heatPicture} /> :
-        <button type="button" class="small" onClick={() => void draw(both).catch(() => undefined)} data-test="distance-picture">{words.heatPicture}</button>}
+      <DistancePicture both={both} />
     </section>
   );
 }
