@@ -28,7 +28,8 @@ export function ColourInput({ id, edit, fallback, mayBeNone }: Props) {
   const pick = (colour: string) => {
     endStep();
     if (colour === "") edit.set(undefined);
-    else edit.set(mayBeNone && colour === none ? null : colour);
+    else if (mayBeNone && colour === none) edit.set(null);
+    else edit.set(/^([0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})$/i.test(colour) ? `#${colour}` : colour);
   };
   return (
     <div class="colour">

@@ -108,11 +108,16 @@ function Toolbar() {
 function Messages() {
   const refusal = pictureRefusal.value;
   if (!refusal || connection.value.kind !== "good") return null;
+  const { key } = refusal;
   return (
     <div class="message is-refusal" role="alert" data-test="picture-refusal">
       <strong>{strings.picture.refused}</strong>
       <span>{refusal.message}</span>
-      {refusal.key && <button type="button" class="small" onClick={() => showKey(refusal.key!)} data-test="show-key">{strings.picture.showKey(refusal.key)}</button>}
+      {key && <span class="group">
+        <button type="button" class="small" onClick={() => showKey(key)} data-test="show-key">{strings.picture.showKey(key)}</button>
+        {key in look.value.keys && <button type="button" class="small" data-test="reset-refused"
+          onClick={() => { endStep(); setKey(key, undefined); }}>{strings.controls.reset(key)}</button>}
+      </span>}
     </div>
   );
 }

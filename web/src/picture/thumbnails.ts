@@ -1,5 +1,5 @@
 import { effect, signal } from "@preact/signals";
-import { request } from "../api/client";
+import { Refusal, request } from "../api/client";
 import { picturePath } from "../state/address";
 import { look } from "../state/history";
 import { effective, isView, type Look, type Value } from "../state/look";
@@ -63,6 +63,18 @@ export function startThumbnails(): () => void {
   });
 }
 
+/** Asks for a picture, and again when a busy server says so. */
+async function patient(path: string): Promise<Blob> {
+  for (;;) {
+    try {
+      return await (await request(path)).blob();
+    } catch (error) {
+      if (!(error instanceof Refusal) || error.retryAfterS === null) throw error;
+      await new Promise((done) => setTimeout(done, 1000 * (error.retryAfterS ?? 1)));
+    }
+  }
+}
+
 const addresses = new Map<string, string>();
 
 async function draw(offers: Offer[], own: number): Promise<void> {
@@ -73,7 +85,7 @@ async function draw(offers: Offer[], own: number): Promise<void> {
     const path = picturePath({ mesh: open, look: small(offer.look), size, format: "webp" });
     if (addresses.get(offer.id) === path) continue;
     try {
-      const url = URL.createObjectURL(await (await request(path)).blob());
+      const url = URL.createObjectURL(await patient(path));
       if (own !== round) return URL.revokeObjectURL(url);
       const before = thumbnails.peek()[offer.id];
       thumbnails.value = { ...thumbnails.peek(), [offer.id]: url };

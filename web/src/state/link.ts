@@ -1,7 +1,7 @@
 import { effect } from "@preact/signals";
 import { base } from "../api/base";
 import { wanted } from "../picture/live";
-import { EMPTY, type Keys, type Look, pairsOf, queryOf, type Value } from "./look";
+import { allPairsOf, EMPTY, type Keys, type Look, queryOf, type Value } from "./look";
 import { look } from "./history";
 import { mesh, type OpenMesh } from "./mesh";
 import { chosenSize, type Format, format, readSize, type Size, sizeText } from "./size";
@@ -25,7 +25,7 @@ export function fragment(): string {
   const pairs: [string, string][] = [["mesh", open.sha256], ["name", open.name]];
   if (open.entry !== null) pairs.push(["entry", open.entry]);
   if (open.formatIn !== null) pairs.push(["format_in", open.formatIn]);
-  pairs.push(...pairsOf(look.value));
+  pairs.push(...allPairsOf(look.value));
   if (chosenSize.value) pairs.push(["size", sizeText(chosenSize.value)]);
   if (format.value !== "webp") pairs.push(["as", format.value]);
   if (compare.value) pairs.push(["beside", JSON.stringify({ ...compare.value, mesh: withoutFiles(compare.value.mesh) })]);
@@ -58,7 +58,9 @@ export function readFragment(text: string): Linked | null {
 function readCompared(text: string | null): Compared | null {
   try {
     const read = JSON.parse(text ?? "null") as Compared | null;
-    if (!read || typeof read.look?.keys !== "object" || typeof read.look.materials !== "object") return null;
+    const isObject = (value: unknown) => value !== null && typeof value === "object" && !Array.isArray(value);
+    if (!read || !isObject(read.look?.keys) || !isObject(read.look.materials)) return null;
+    if (!Object.values(read.look.materials).every(isObject)) return null;
     if (read.mesh && !/^[0-9a-f]{64}$/.test(read.mesh.sha256)) return null;
     return read;
   } catch {
@@ -68,19 +70,20 @@ function readCompared(text: string | null): Compared | null {
 
 /** The look of pairs. Values are read as JSON where they are numbers, words of JSON, or lists. */
 export function lookOf(pairs: [string, string][]): Look {
-  const keys: Record<string, Value> = {};
-  const materials: Record<string, Record<string, Value>> = {};
+  // Without a prototype, because the names are those of an address: `__proto__` is a name like any other.
+  const keys = Object.create(null) as Record<string, Value>;
+  const materials = Object.create(null) as Record<string, Record<string, Value>>;
   for (const [key, text] of pairs) {
     if (key === "materials") Object.assign(materials, flatMaterials(text));
     const named = /^materials\.([^.]+)\.(.+)$/.exec(key);
-    if (named) (materials[named[1]!] ??= {})[named[2]!] = valueOf(text);
+    if (named) (materials[named[1]!] ??= Object.create(null) as Record<string, Value>)[named[2]!] = valueOf(text);
     else if (key !== "materials") keys[key] = valueOf(text);
   }
   return { ...EMPTY, keys, materials };
 }
 
 function valueOf(text: string): Value {
-  if (/^-?\d+(\.\d+)?(e[-+]?\d+)?$/i.test(text) || /^(true|false|null)$/.test(text)) return JSON.parse(text) as Value;
+  if (/^-?(0|[1-9]\d*)(\.\d+)?(e[-+]?\d+)?$/i.test(text) || /^(true|false|null)$/.test(text)) return JSON.parse(text) as Value;
   if (/^[[{]/.test(text)) {
     try {
       return JSON.parse(text) as Value;
@@ -95,10 +98,8 @@ function valueOf(text: string): Value {
 
 function flatMaterials(text: string): Record<string, Record<string, Value>> {
   const nested = valueOf(text);
-  const out: Record<string, Record<string, Value>> = {};
-  if (nested === null || typeof nested !== "object" || Array.isArray(nested)) return out;
-  for (const [name, own] of Object.entries(nested)) out[name] = flat(own);
-  return out;
+  if (nested === null || typeof nested !== "object" || Array.isArray(nested)) return {};
+  return Object.fromEntries(Object.entries(nested).map(([name, own]) => [name, flat(own)]));
 }
 
 function flat(own: Value): Record<string, Value> {

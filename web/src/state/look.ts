@@ -68,9 +68,13 @@ export function encode(text: string): string {
   return plain.replace(/['()*!]/g, (c) => `%${c.charCodeAt(0).toString(16).toUpperCase()}`);
 }
 
-/** The look as pairs of a query. Materials whose names have dots go as one JSON value. */
+/** The look as pairs of a query that the server takes. */
 export function pairsOf(look: Look): [string, string][] {
-  const { keys, materials } = effective(look);
+  return allPairsOf(effective(look));
+}
+
+/** All of the look as pairs. Materials whose names have dots go as one JSON value. */
+export function allPairsOf({ keys, materials }: Look): [string, string][] {
   const pairs = Object.entries(keys).map(([key, value]): [string, string] => [key, textOf(value)]);
   const named = Object.entries(materials).filter(([, own]) => Object.keys(own).length > 0);
   if (named.length === 0) return pairs;
