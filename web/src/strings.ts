@@ -22,6 +22,7 @@ export const strings = {
   sampleName: "sample.obj",
   loading: "Loading…",
   skip: "Skip to the picture",
+  home: "Start with another mesh",
 
   open: {
     heading: "Drop a mesh here",
@@ -225,14 +226,14 @@ export const strings = {
     looks: "a look",
     looksHelp: "Keeps this look on the left side. Then change the settings.",
     mesh: "a mesh…",
-    stop: "End comparison",
+    stop: "End",
     left: "Left", right: "Right",
     divider: "Divider between the two pictures",
     heat: "Error heat",
     figures: (rmse: string, most: number, share: string) =>
       `RMSE ${rmse} / 255, largest difference ${most} / 255, ${share} % of the pixels differ`,
     same: "The two pictures are the same, pixel by pixel.",
-    keep: "Use the left look",
+    keep: "Use left",
     kept: "kept look",
     now: "this look",
     differences: "Differences of the meshes",

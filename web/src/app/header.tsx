@@ -14,7 +14,7 @@ export function Header() {
   const isOpen = open && phase.value.kind === "open";
   return (
     <header class="top">
-      <h1 class="brand">{strings.name}</h1>
+      <h1 class="brand"><a href="#" title={strings.home} data-test="home">{strings.name}</a></h1>
       {isOpen && <span class="file" title={open.name}><bdi data-test="mesh-name">{open.name}</bdi>
         {report.value && <span class="quiet"> {count(report.value.triangles)} {strings.report.triangles.toLowerCase()}</span>}</span>}
       <span class="spring" />

@@ -112,7 +112,7 @@ function Numeric({ field, edit, id }: Props) {
     <div class="numeric">
       {range && <input type="range" {...range} step={range.step} value={number ?? range.min} tabIndex={-1}
         class={number === null ? "is-unset" : ""} aria-label={strings.controls.slider(field.key)}
-        onPointerDown={() => { endStep(); hold(true); }} onPointerUp={() => hold(false)} onPointerCancel={() => hold(false)}
+        onPointerDown={() => { endStep(); hold(true); }} onPointerUp={() => hold(false)} onPointerCancel={() => hold(false)} onChange={() => hold(false)}
         onInput={(e) => put(e.currentTarget.value)} />}
       <input type="text" id={id} inputMode="decimal"
         placeholder={number === null ? hint : ""}

@@ -31,7 +31,7 @@ export function SectionPlanes({ edit, id }: { edit: Edit; id: string }) {
           onClick={() => { endStep(); if (plane?.axis === axis) edit.set(undefined); else put(axis, plane?.share ?? 50); }}>{axis}</button>)}
       </div>
       {plane && <input type="range" id={id} min={0} max={100} step={1} value={plane.share} aria-label={strings.controls.slider(id)}
-        onPointerDown={() => { endStep(); hold(true); }} onPointerUp={() => hold(false)} onPointerCancel={() => hold(false)}
+        onPointerDown={() => { endStep(); hold(true); }} onPointerUp={() => hold(false)} onPointerCancel={() => hold(false)} onChange={() => hold(false)}
         onInput={(e) => put(plane.axis, Number(e.currentTarget.value))} />}
     </div>
   );

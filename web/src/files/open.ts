@@ -120,12 +120,26 @@ function nameOf(files: NamedFile[]): string {
   return (files.find(isMesh) ?? files[0])?.path ?? strings.unnamed;
 }
 
-/** Shows a stored mesh, and asks for its report. */
-export function show(open: OpenMesh): void {
+function clear(): void {
+  for (const one of new Set([shown.value, finished.value])) if (one) URL.revokeObjectURL(one.url);
   shown.value = null;
   finished.value = null;
   pictureRefusal.value = null;
   report.value = null;
+}
+
+/** Back to the empty page. */
+export function close(): void {
+  clear();
+  upload?.abort();
+  mesh.value = null;
+  phase.value = { kind: "empty" };
+  document.title = strings.name;
+}
+
+/** Shows a stored mesh. */
+export function show(open: OpenMesh): void {
+  clear();
   mesh.value = open;
   phase.value = { kind: "open" };
   document.title = strings.title(open.name);

@@ -116,9 +116,9 @@ function flat(own: Value): Record<string, Value> {
 export function startLink(): void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   effect(() => {
+    clearTimeout(timer);
     if (!wanted.value) return;
     const text = fragment();
-    clearTimeout(timer);
     timer = setTimeout(() => history.replaceState(null, "", location.pathname + location.search + text), 250);
   });
 }
