@@ -2,11 +2,11 @@ import { signal, useSignalEffect } from "@preact/signals";
 import { apiKey } from "../api/key";
 import { finished, wanted } from "../picture/live";
 import { capabilities, stem } from "../state/mesh";
-import { pictureAddress } from "../state/address";
+import { type Picture, pictureAddress } from "../state/address";
 import { announcement } from "../state/phase";
 import { chosenSize, extension, type Format, format, pictureSize, readSize, sizeText } from "../state/size";
 import { strings } from "../strings";
-import { KINDS, type LineKind, lineOf } from "./lines";
+import { documentAddress, KINDS, type LineKind, lineOf } from "./lines";
 import { signedAndTried } from "./sign";
 
 const kind = signal<LineKind>("url");
@@ -65,11 +65,16 @@ export function CopyPanel() {
         <button type="button" class="primary" data-test="copy" onClick={() => void copyText(text, "line")}>
           {copied.value === "line" ? strings.copy.copied : strings.copy.copy}</button>
       </div>
-      <p class="quiet">{copied.value === "line-failed" ? strings.copy.failed : signedText ? strings.copy.signedNote : strings.copy.notes[kind.value]}
+      <p class="quiet">{copied.value === "line-failed" ? strings.copy.failed : signedText ? strings.copy.signedNote : noteOf(picture)}
         {withKey && ` ${strings.copy.keyNote}`}
         {keyed && ["url", "srcset", "markdown"].includes(kind.value) && ` ${strings.copy.keyedNote}`}</p>
     </section>
   );
+}
+
+function noteOf(picture: Picture): string {
+  if (kind.value === "json") return strings.copy.jsonNote(documentAddress(picture));
+  return strings.copy.notes[kind.value];
 }
 
 function OutputControls() {

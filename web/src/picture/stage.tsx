@@ -1,12 +1,12 @@
 import { useEffect, useRef } from "preact/hooks";
 import { fit, isAtFault, showView, zoom } from "../camera/move";
-import { showKey } from "../app/tab";
+import { showKey, tab } from "../app/tab";
 import { CompareLayer, HeatText, SideNames } from "../compare/layer";
 import { CompareMenu } from "../compare/menu";
 import { compare } from "../compare/state";
 import { setKey } from "../state/edit";
 import { canUndo, endStep, look } from "../state/history";
-import { mesh } from "../state/mesh";
+import { mesh, report } from "../state/mesh";
 import { connection, pictureRefusal } from "../state/phase";
 import { room, shownSize } from "../state/size";
 import { strings } from "../strings";
@@ -33,6 +33,7 @@ export function Stage() {
         <HeatText />
         {isAtFault() && <span class="fault-mark" aria-hidden="true" data-test="fault-mark" />}
         {busy.value && <span class="progress" aria-hidden="true" />}
+        <Warnings />
         <Messages />
       </div>
     </section>
@@ -103,6 +104,16 @@ function Toolbar() {
       {mesh.value && <CompareMenu />}
     </div>
   );
+}
+
+/** Warnings of the picture; those that the mesh's report has, too, in its words. */
+function Warnings() {
+  const codes = (finished.value?.headers.get("x-warnings") ?? "").split(",").map((code) => code.trim()).filter(Boolean);
+  if (codes.length === 0 || pictureRefusal.value) return null;
+  const stated = report.value?.warnings ?? [];
+  const texts = codes.map((code) => stated.find((one) => one.code === code)?.detail ?? code.replaceAll("_", " "));
+  return <button type="button" class="warning-mark" title={texts.join("\n")} data-test="warnings"
+    onClick={() => (tab.value = "explain")}>{strings.picture.warning(texts.join("; "))}</button>;
 }
 
 function Messages() {

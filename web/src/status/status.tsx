@@ -73,6 +73,7 @@ function Tiles({ found }: { found: ServerStatus }) {
     [words.gpu, gpu ? (gpu.name ?? gpu.state ?? null) : null, gpu?.reason ?? undefined],
     [words.gpuLosses, found.gpu_losses ? words.times(found.gpu_losses) : null],
     [words.servers, (found.servers ?? 1) > 1 ? count(found.servers!) : null],
+    [words.oldest, found.shared_queue?.oldest_s ? duration(found.shared_queue.oldest_s) : null],
     [words.webhooks, found.webhooks_waiting ? count(found.webhooks_waiting) : null],
     [words.quarantined, found.quarantined_meshes ? count(found.quarantined_meshes) : null],
   ];
