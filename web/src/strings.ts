@@ -20,6 +20,8 @@ export const strings = {
   title: (mesh: string) => `${mesh} · meshsnap`,
   unnamed: "mesh",
   sampleName: "sample.obj",
+  content: ({ triangles, points }: { triangles: number; points: number }) =>
+    triangles === 0 && points > 0 ? plural(points, "point") : plural(triangles, "triangle"),
   loading: "Loading…",
   skip: "Skip to the picture",
   home: "Start with another mesh",
@@ -221,14 +223,17 @@ export const strings = {
   },
 
   compare: {
-    start: "Compare with",
-    looks: "a look",
+    start: "Compare",
+    looks: "look",
     looksHelp: "Keeps this look on the left side. Then change the settings.",
-    mesh: "a mesh…",
+    withLook: "Compare with the look of now",
+    withMesh: "Compare with another mesh",
+    mesh: "mesh…",
     stop: "End",
     left: "Left", right: "Right",
     divider: "Divider between the two pictures",
     heat: "Error heat",
+    heatShort: "Heat",
     figures: (rmse: string, most: number, share: string) =>
       `RMSE ${rmse} / 255, largest difference ${most} / 255, ${share} % of the pixels differ`,
     same: "The two pictures are the same, pixel by pixel.",

@@ -6,7 +6,7 @@ import { openFiles } from "../files/open";
 import { shareLink } from "../state/link";
 import { mesh, report } from "../state/mesh";
 import { phase } from "../state/phase";
-import { count, strings } from "../strings";
+import { strings } from "../strings";
 
 export function Header() {
   const input = useRef<HTMLInputElement>(null);
@@ -16,7 +16,7 @@ export function Header() {
     <header class="top">
       <h1 class="brand"><a href="#" title={strings.home} data-test="home">{strings.name}</a></h1>
       {isOpen && <span class="file" title={open.name}><bdi data-test="mesh-name">{open.name}</bdi>
-        {report.value && <span class="quiet"> {count(report.value.triangles)} {strings.report.triangles.toLowerCase()}</span>}</span>}
+        {report.value && <span class="quiet"> {strings.content(report.value)}</span>}</span>}
       <span class="spring" />
       {apiKey.value && <button type="button" class="link" onClick={() => { forgetKey(); location.reload(); }} data-test="key-forget">{strings.key.forget}</button>}
       {isOpen && <>

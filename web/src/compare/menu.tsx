@@ -22,8 +22,8 @@ export function CompareMenu() {
     return (
       <div class="group compare-menu">
         <span class="label">{strings.compare.start}</span>
-        <button type="button" onClick={keepLook} title={strings.compare.looksHelp} data-test="compare-look">{strings.compare.looks}</button>
-        <button type="button" onClick={() => input.current?.click()} data-test="compare-mesh">{strings.compare.mesh}</button>
+        <button type="button" onClick={keepLook} title={strings.compare.looksHelp} aria-label={strings.compare.withLook} data-test="compare-look">{strings.compare.looks}</button>
+        <button type="button" onClick={() => input.current?.click()} aria-label={strings.compare.withMesh} data-test="compare-mesh">{strings.compare.mesh}</button>
         <input ref={input} type="file" multiple hidden data-test="compare-input" onChange={(e) => {
           const files = filesOfInput(e.currentTarget.files!);
           e.currentTarget.value = "";
@@ -34,7 +34,7 @@ export function CompareMenu() {
   }
   return (
     <div class="group compare-menu">
-      <button type="button" aria-pressed={heat.value} onClick={() => (heat.value = !heat.value)} data-test="heat-toggle">{strings.compare.heat}</button>
+      <button type="button" aria-pressed={heat.value} onClick={() => (heat.value = !heat.value)} aria-label={strings.compare.heat} title={strings.compare.heat} data-test="heat-toggle">{strings.compare.heatShort}</button>
       {!compared.mesh && <button type="button" data-test="compare-use" onClick={() => { applyLook("compare", compared.look); endCompare(); }}>{strings.compare.keep}</button>}
       <button type="button" onClick={endCompare} data-test="compare-end">{strings.compare.stop}</button>
     </div>

@@ -48,7 +48,6 @@ export function CopyPanel() {
   const keyed = apiKey.value !== null;
   const signedText = kind.value === "signed" ? signedAddress.value : null;
   const text = signedText ?? lineOf(kind.value, picture, { keyed, limit });
-  const withKey = keyed && ["curl", "python", "javascript"].includes(kind.value);
   return (
     <section class="copy" aria-label={strings.copy.heading}>
       <div class="copy-head">
@@ -65,14 +64,14 @@ export function CopyPanel() {
         <button type="button" class="primary" data-test="copy" onClick={() => void copyText(text, "line")}>
           {copied.value === "line" ? strings.copy.copied : strings.copy.copy}</button>
       </div>
-      <p class="quiet">{copied.value === "line-failed" ? strings.copy.failed : signedText ? strings.copy.signedNote : noteOf(picture)}
-        {withKey && ` ${strings.copy.keyNote}`}
-        {keyed && ["url", "srcset", "markdown"].includes(kind.value) && ` ${strings.copy.keyedNote}`}</p>
+      <p class="quiet">{copied.value === "line-failed" ? strings.copy.failed : signedText ? strings.copy.signedNote : noteOf(picture, keyed)}</p>
     </section>
   );
 }
 
-function noteOf(picture: Picture): string {
+function noteOf(picture: Picture, keyed: boolean): string {
+  if (keyed && ["url", "srcset", "markdown"].includes(kind.value)) return strings.copy.keyedNote;
+  if (keyed && ["curl", "python", "javascript"].includes(kind.value)) return strings.copy.keyNote;
   if (kind.value === "json") return strings.copy.jsonNote(documentAddress(picture));
   return strings.copy.notes[kind.value];
 }

@@ -71,7 +71,7 @@ function PictureImage() {
 /** How the picture is turned, until it has been turned once. */
 function Hint() {
   const keys = look.value.keys;
-  if (canUndo.value || "camera.azimuth_deg" in keys || "camera.eye" in keys || compare.value) return null;
+  if (canUndo.value || "camera.azimuth_deg" in keys || "camera.eye" in keys || compare.value || warningCodes().length > 0) return null;
   const text = matchMedia("(hover: none)").matches ? strings.picture.touchHint : strings.picture.hint;
   return <span class="hint" aria-hidden="true">{text}</span>;
 }
@@ -106,9 +106,13 @@ function Toolbar() {
   );
 }
 
+function warningCodes(): string[] {
+  return (finished.value?.headers.get("x-warnings") ?? "").split(",").map((code) => code.trim()).filter(Boolean);
+}
+
 /** Warnings of the picture; those that the mesh's report has, too, in its words. */
 function Warnings() {
-  const codes = (finished.value?.headers.get("x-warnings") ?? "").split(",").map((code) => code.trim()).filter(Boolean);
+  const codes = warningCodes();
   if (codes.length === 0 || pictureRefusal.value) return null;
   const stated = report.value?.warnings ?? [];
   const texts = codes.map((code) => stated.find((one) => one.code === code)?.detail ?? code.replaceAll("_", " "));
