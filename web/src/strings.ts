@@ -82,7 +82,8 @@ export const strings = {
 
   picture: {
     alt: (name: string, style: string) => `${name}, drawn in the style ${style}`,
-    announced: ({ width, height }: { width: number; height: number }) => `Picture of ${width} by ${height} pixels`,
+    announced: (style: string, azimuth: number, elevation: number) =>
+      `Drawn in the style ${style}, from ${azimuth} degrees around and ${elevation} degrees above`,
     stage: "Picture. Arrow keys turn it, plus and minus zoom, 0 fits it.",
     hint: "Drag to turn, scroll to zoom, Shift and drag to move, double click to fit",
     touchHint: "Drag to turn, pinch to zoom",

@@ -1,8 +1,10 @@
 import { computed, effect, signal } from "@preact/signals";
+import { needsKey } from "../api/key";
+import { anglesOf } from "../camera/orbit";
 import type { Picture } from "../state/address";
 import { look } from "../state/history";
-import type { Keys } from "../state/look";
-import { capabilities, mesh } from "../state/mesh";
+import type { Keys, Look } from "../state/look";
+import { capabilities, mesh, report } from "../state/mesh";
 import { announcement, phase, pictureRefusal } from "../state/phase";
 import { chosenSize, format, pictureSize, shownSize, type Size, within } from "../state/size";
 import { scaledLook } from "../state/scaled";
@@ -20,6 +22,7 @@ export const moving = signal(false);
 
 const SETTLE_MS = 180;
 const DRAFT_GOAL_MS = 60;
+const SLOW_MS = 400;
 let draftSide = 320;
 let settle: ReturnType<typeof setTimeout> | undefined;
 
@@ -43,6 +46,13 @@ function learn({ draft, tookMs }: Shown): void {
   else if (tookMs < DRAFT_GOAL_MS * 0.6) draftSide = Math.min(720, draftSide * 1.06);
 }
 
+/** What a picture shows, for those who do not see it. */
+function described({ look }: Picture): string {
+  const up = String(look.keys["camera.up"] ?? report.peek()?.up ?? "y");
+  const { azimuth, elevation } = anglesOf(look.keys, up);
+  return strings.picture.announced(String(look.keys["style"] ?? "auto"), Math.round(azimuth), Math.round(elevation));
+}
+
 export const loop = new PictureLoop({
   shown(next) {
     learn(next);
@@ -52,7 +62,7 @@ export const loop = new PictureLoop({
     if (!next.draft) {
       const last = finished.value;
       finished.value = next;
-      announcement.value = strings.picture.announced(next.picture.size);
+      announcement.value = described(next.picture);
       if (last && last !== previous) URL.revokeObjectURL(last.url);
     }
     if (previous && previous !== finished.value) setTimeout(() => URL.revokeObjectURL(previous.url), 1000);
@@ -103,12 +113,23 @@ function draftMost(size: Size): number {
   return Math.round(Math.min(draftSide, onScreen, Math.max(size.width, size.height)) / 8) * 8 || 8;
 }
 
+/** The look of the last draft. */
+let drafted: Look | null = null;
+
+/** True if pictures of full size take so long that a draft is welcome before them. */
+function isSlow(): boolean {
+  return (finished.peek()?.tookMs ?? 0) > SLOW_MS;
+}
+
 /** Asks for pictures whenever what is wanted changes. */
 export function startPictures(): () => void {
   return effect(() => {
     const picture = wanted.value;
-    if (!picture) return loop.stop();
+    if (!picture || needsKey.value) return loop.stop();
+    const isNew = drafted !== picture.look && finished.peek()?.picture.look !== picture.look;
     if (moving.value) loop.want(draftOf(picture), true);
-    else loop.want(picture, false);
+    else if (isNew && isSlow()) loop.wantBoth(draftOf(picture), picture);
+    else return loop.want(picture, false);
+    drafted = picture.look;
   });
 }

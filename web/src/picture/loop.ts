@@ -17,6 +17,8 @@ export interface Shown {
 interface Order {
   picture: Picture;
   draft: boolean;
+  /** What is fetched after it, unless something newer waits. */
+  then?: Order;
 }
 
 interface Listener {
@@ -40,8 +42,17 @@ export class PictureLoop {
   constructor(private readonly listener: Listener) {}
 
   want(picture: Picture, draft: boolean): void {
-    this.waiting = { picture, draft };
-    if (this.running && !(this.running.order.draft && draft)) this.running.abort.abort();
+    this.take({ picture, draft });
+  }
+
+  /** Asks for a draft and then for the whole: for pictures that take long. */
+  wantBoth(draft: Picture, picture: Picture): void {
+    this.take({ picture: draft, draft: true, then: { picture, draft: false } });
+  }
+
+  private take(order: Order): void {
+    this.waiting = order;
+    if (this.running && !(this.running.order.draft && order.draft)) this.running.abort.abort();
     if (!this.running) this.next();
   }
 
@@ -63,6 +74,7 @@ export class PictureLoop {
     this.listener.busy(true);
     void this.fetch(order, abort.signal).then((retryMs) => {
       this.running = null;
+      if (retryMs === null && !abort.signal.aborted) this.waiting ??= order.then ?? null;
       if (retryMs === null || this.waiting) return this.next();
       this.waiting = order;
       this.timer = setTimeout(() => this.next(), retryMs);
@@ -84,7 +96,7 @@ export class PictureLoop {
       }
       connection.value = { kind: "good" };
       const tookMs = performance.now() - began;
-      this.listener.shown({ ...order, path, url, bytes, headers: answer.headers, tookMs });
+      this.listener.shown({ picture: order.picture, draft: order.draft, path, url, bytes, headers: answer.headers, tookMs });
       return null;
     } catch (error) {
       return signal.aborted || isAbort(error) ? null : this.failed(error);
