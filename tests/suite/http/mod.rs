@@ -13,6 +13,7 @@ pub mod meshes_room;
 pub mod metrics;
 pub mod mistakes;
 pub mod openapi;
+pub mod page;
 pub mod quality_target;
 pub mod schema;
 pub mod shared_queue;

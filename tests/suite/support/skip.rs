@@ -26,8 +26,10 @@ pub enum Need {
     Compiler,
     /// `nats-server` on the `PATH`, and a later one, which `tests/run` installs into `target/python`.
     Nats,
-    /// Chromium on the `PATH`, and axe-core, which `tests/run` installs into `target/node`.
+    /// Chromium on the `PATH`, and the tools that drive it, which `tests/run` installs into `target/node`.
     Browser,
+    /// The tools that build the pages of `web/`, which `tests/run` installs into `target/web`.
+    Npm,
 }
 
 impl Need {
@@ -44,6 +46,7 @@ impl Need {
             Self::Compiler => "compiler",
             Self::Nats => "nats",
             Self::Browser => "browser",
+            Self::Npm => "npm",
         }
     }
 }

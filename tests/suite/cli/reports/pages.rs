@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use serde_json::Value;
 
 use super::super::check::{check, folder};
-use crate::support::skip::{Need, skip};
+use crate::http::page::browser_and;
 
 /// Widths of a phone and of a desk.
 const WIDTHS_PX: [u32; 2] = [500, 1280];
@@ -31,21 +31,8 @@ const SCRIPT: &str = "axe.run(document, { resultTypes: ['violations'] }).then((r
 
 /// The browser and the source of axe-core. None, and the test counts as skipped, where one is missing.
 fn tools() -> Option<(PathBuf, String)> {
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let find = |name: &str| std::env::split_paths(&path).map(|folder| folder.join(name)).find(|file| file.is_file());
-    let browser = ["chromium", "chromium-browser", "google-chrome"].into_iter().find_map(find);
-    let axe = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/node/node_modules/axe-core/axe.min.js");
-    match (browser, fs::read_to_string(axe)) {
-        (Some(browser), Ok(axe)) => Some((browser, axe)),
-        (None, _) => {
-            skip(Need::Browser, "chromium");
-            None
-        }
-        (_, Err(_)) => {
-            skip(Need::Browser, "axe-core in target/node");
-            None
-        }
-    }
+    let (browser, modules) = browser_and("axe-core")?;
+    Some((browser, fs::read_to_string(modules.join("axe-core/axe.min.js")).unwrap()))
 }
 
 /// A page as the browser has it after its scripts have run.

@@ -70,6 +70,7 @@ fn requests(mesh: &str, job: &str) -> Vec<(&'static str, String, Vec<u8>)> {
         ("PUT", mesh.to_owned(), CUBE_OBJ.to_vec()),
         ("DELETE", mesh.to_owned(), Vec::new()),
         ("GET", "/metrics".to_owned(), Vec::new()),
+        ("GET", "/v1/status".to_owned(), Vec::new()),
         ("GET", "/v1/capabilities".to_owned(), Vec::new()),
     ]
 }
@@ -210,9 +211,10 @@ fn a_key_does_what_its_scopes_permit_and_sees_its_own() {
         }
         forbidden
     };
-    assert_eq!(forbidden("other"), ["GET /metrics"]);
+    let operating = ["GET /metrics", "GET /v1/status"].map(str::to_owned);
+    assert_eq!(forbidden("other"), operating);
     let storing = ["POST /v1/meshes".to_owned(), format!("PUT {mesh}"), format!("DELETE {mesh}")];
-    assert_eq!(forbidden("viewer"), [&storing[..], &["GET /metrics".to_owned()]].concat());
+    assert_eq!(forbidden("viewer"), [&storing[..], &operating].concat());
     assert_eq!(forbidden("prometheus").len(), requests(&mesh, &job).len() - 2, "metrics and capabilities remain");
     assert_eq!(forbidden("boss"), [""; 0]);
     let uploader = forbidden("uploader");
@@ -220,7 +222,7 @@ fn a_key_does_what_its_scopes_permit_and_sees_its_own() {
         uploader.contains(&format!("GET {job}/result")) && !uploader.contains(&format!("HEAD {mesh}")),
         "{uploader:?}"
     );
-    assert_eq!(uploader.len(), 10, "{uploader:?}");
+    assert_eq!(uploader.len(), 11, "{uploader:?}");
     // What the uploader has stored and deleted under the same name is still there for its first owner.
     assert_eq!(ask(&server, "ci", "HEAD", &mesh, b"").status, 200);
     assert_eq!(ask(&server, "boss", "DELETE", &mesh, b"").status, 204);
