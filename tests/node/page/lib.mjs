@@ -30,9 +30,9 @@ const children = new Set();
 const folders = [];
 let browser;
 
-/** Starts the program under test as a server; port 0 is any free one. */
-export async function serve(flags = [], { keys, port = 0 } = {}) {
-  const words = ["serve", "--listen", `127.0.0.1:${port}`, "--backend", "cpu", ...flags];
+/** Starts the program under test as a server on a free port. It ends with the case. */
+export async function serve(flags = [], { keys } = {}) {
+  const words = ["serve", "--listen", "127.0.0.1:0", "--backend", "cpu", ...flags];
   const env = { PATH: process.env.PATH, MESHSNAP_EPHEMERAL: "true", HOME: "/nonexistent", ...(keys && { MESHSNAP_API_KEYS: keys }) };
   const child = spawn(program, words, { env, stdio: ["ignore", "pipe", "ignore"] });
   children.add(child);
@@ -44,12 +44,7 @@ export async function serve(flags = [], { keys, port = 0 } = {}) {
     });
     child.on("exit", (code) => fail(new Error(`the server ended with ${code}: ${said}`)));
   });
-  const stop = () => new Promise((ended) => {
-    children.delete(child);
-    child.on("exit", ended);
-    child.kill("SIGKILL");
-  });
-  return { url, port: Number(new URL(url).port), stop };
+  return { url, port: Number(new URL(url).port) };
 }
 
 /** Flags of a server with these keys, each with its scopes. */

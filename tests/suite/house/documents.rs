@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use super::structure::{files_below, sources};
 
 /// Folders of the repository that documents name files in.
-const TOP_FOLDERS: [&str; 11] =
-    ["src", "shaders", "tests", "docs", "api", "deploy", "fuzz", "xtask", "examples", ".ci", ".github"];
+const TOP_FOLDERS: [&str; 12] =
+    ["src", "web", "shaders", "tests", "docs", "api", "deploy", "fuzz", "xtask", "examples", ".ci", ".github"];
 
 /// Words that stand for a name in a path, such as `src/render/import/NAME/`. The folder before them has to exist.
 const PLACEHOLDERS: [&str; 5] = ["NAME", "PATH", "STAGE", "X", "TARGET-WHAT-IT-WAS"];

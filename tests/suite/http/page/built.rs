@@ -17,7 +17,8 @@ fn workshop() -> Option<tempfile::TempDir> {
         return None;
     }
     // Tools of another list may build other bytes.
-    let lists = ["target/web/package-lock.json", "web/package-lock.json"].map(|path| fs::read(root.join(path)).unwrap());
+    let lists =
+        ["target/web/package-lock.json", "web/package-lock.json"].map(|path| fs::read(root.join(path)).unwrap());
     assert!(lists[0] == lists[1], "target/web is old: run tests/run");
     let folder = tempfile::tempdir().unwrap();
     copy(&root.join("web"), &folder.path().join("web"));
@@ -57,6 +58,12 @@ fn the_pages_are_what_their_sources_give() {
         let stored = fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(&pages).join(name)).unwrap();
         assert!(made == stored, "src/server/page/{name} is old: run `npm ci && npm run build` in web/");
     }
+}
+
+#[test]
+fn looks_lines_cameras_and_controls_of_the_pages_are_right() {
+    let Some(folder) = workshop() else { return };
+    script(&folder, "test");
 }
 
 #[test]
