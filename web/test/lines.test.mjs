@@ -21,13 +21,16 @@ test("addresses have the page's origin and prefix", () => {
 });
 
 test("a shell reads the words as they were", () => {
-  for (const word of ["plain", "it's", "$HOME `x` \"q\" \\", "a\nb", ""]) {
+  for (const word of ["plain", "it's", '$HOME `x` "q" \\', "a\nb", ""]) {
     assert.equal(execFileSync("/bin/sh", ["-c", `printf %s ${shell(word)}`]).toString(), word);
   }
 });
 
 test("the command line draws the file", () => {
-  assert.equal(line("command"), `meshsnap render 'it'\\''s <b>.obj' -o 'it_s _b_.webp' --style wire --set 'wire.color=#f00' --size 640x480`);
+  assert.equal(
+    line("command"),
+    `meshsnap render 'it'\\''s <b>.obj' -o 'it_s _b_.webp' --style wire --set 'wire.color=#f00' --size 640x480`,
+  );
 });
 
 test("keys are named, never written", () => {

@@ -20,11 +20,19 @@ test("each key has a control, apart from short names and what the page has elsew
   const elsewhere = ["$schema", "style", "materials", "mesh", "image.width", "image.height", "image.format"];
   const short = Object.entries(schema.properties).filter(([, one]) => one.description?.startsWith("Short for"));
   const left = new Set([...elsewhere, ...short.map(([name]) => name)]);
-  assert.deepEqual(fields.map(({ key }) => key).sort(), keysOf(schema).filter((key) => !left.has(key)).sort());
+  assert.deepEqual(
+    fields.map(({ key }) => key).sort(),
+    keysOf(schema)
+      .filter((key) => !left.has(key))
+      .sort(),
+  );
 });
 
 test("no control falls back to plain text", () => {
-  assert.deepEqual(fields.filter(({ kind }) => kind === "text" || kind === "json").map(({ key }) => key), []);
+  assert.deepEqual(
+    fields.filter(({ kind }) => kind === "text" || kind === "json").map(({ key }) => key),
+    [],
+  );
 });
 
 test("sliders lie in the ranges of their keys", () => {
@@ -37,5 +45,10 @@ test("sliders lie in the ranges of their keys", () => {
 });
 
 test("materials have the layers that the schema gives them", () => {
-  assert.deepEqual(materialSectionsOf(schema).map(({ name }) => name).sort(), ["outline", "surface", "wire"]);
+  assert.deepEqual(
+    materialSectionsOf(schema)
+      .map(({ name }) => name)
+      .sort(),
+    ["outline", "surface", "wire"],
+  );
 });

@@ -27,13 +27,23 @@ export function App() {
   const isOpen = phase.value.kind === "open" && !needsKey.value;
   return (
     <>
-      <button type="button" class="skip" onClick={() => document.querySelector<HTMLElement>(".picture, .cover button")?.focus()}>{strings.skip}</button>
+      <button
+        type="button"
+        class="skip"
+        onClick={() => document.querySelector<HTMLElement>(".picture, .cover button")?.focus()}
+      >
+        {strings.skip}
+      </button>
       <Header />
       <main class={isOpen ? "bench" : "bench is-empty"} data-tab={tab.value}>
         {isOpen ? <Bench /> : <Cover />}
       </main>
       <Notices />
-      {dropping.value && <div class="drop-hint" aria-hidden="true">{compare.value?.mesh ? strings.open.dropCompare : strings.open.dropHint}</div>}
+      {dropping.value && (
+        <div class="drop-hint" aria-hidden="true">
+          {compare.value?.mesh ? strings.open.dropCompare : strings.open.dropHint}
+        </div>
+      )}
     </>
   );
 }
@@ -43,14 +53,31 @@ function Bench() {
   const selected = narrow.value ? tab.value : side;
   return (
     <>
-      <nav class="panel left" aria-label={strings.tabs.looks}><Looks /></nav>
+      <nav class="panel left" aria-label={strings.tabs.looks}>
+        <Looks />
+      </nav>
       <Stage />
-      <div class="below"><CopyPanel /></div>
+      <div class="below">
+        <CopyPanel />
+      </div>
       <div class="panel right">
         <div class="tabs" role="tablist" aria-label={strings.tabs.panels} onKeyDown={tabKeys}>
-          {TABS.map((name) => <button type="button" role="tab" key={name} id={`tab-${name}`} class={`tab tab-${name}`}
-            aria-selected={selected === name} aria-controls="panel" tabIndex={selected === name ? 0 : -1}
-            data-test={`tab-${name}`} onClick={() => (tab.value = name)}>{strings.tabs[name]}</button>)}
+          {TABS.map((name) => (
+            <button
+              type="button"
+              role="tab"
+              key={name}
+              id={`tab-${name}`}
+              class={`tab tab-${name}`}
+              aria-selected={selected === name}
+              aria-controls="panel"
+              tabIndex={selected === name ? 0 : -1}
+              data-test={`tab-${name}`}
+              onClick={() => (tab.value = name)}
+            >
+              {strings.tabs[name]}
+            </button>
+          ))}
         </div>
         <div class="panel-body" role="tabpanel" id="panel" aria-labelledby={`tab-${side}`} tabIndex={-1}>
           {side === "settings" && <Controls />}
@@ -81,27 +108,46 @@ function listen(): () => void {
   const on = { signal: off.signal };
   narrowQuery.addEventListener("change", () => (narrow.value = narrowQuery.matches), on);
   const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
-  addEventListener("dragover", (event) => {
-    if (!hasFiles(event)) return;
-    event.preventDefault();
-    dropping.value = true;
-  }, on);
-  addEventListener("dragleave", (event) => { if (!event.relatedTarget) dropping.value = false; }, on);
-  addEventListener("drop", (event) => {
-    dropping.value = false;
-    if (!event.dataTransfer || !hasFiles(event)) return;
-    event.preventDefault();
-    const into = compare.value?.mesh ? compareFiles : (files: Parameters<typeof openFiles>[0]) => openFiles(files);
-    void filesOfDrop(event.dataTransfer).then(into);
-  }, on);
-  addEventListener("keydown", (event) => {
-    const typing = event.target instanceof HTMLInputElement && /^(text|search|number|password)$/.test(event.target.type);
-    if (!(event.ctrlKey || event.metaKey) || typing) return;
-    const key = event.key.toLowerCase();
-    if (key === "z" && !event.shiftKey) undo();
-    else if ((key === "z" && event.shiftKey) || key === "y") redo();
-    else return;
-    event.preventDefault();
-  }, on);
+  addEventListener(
+    "dragover",
+    (event) => {
+      if (!hasFiles(event)) return;
+      event.preventDefault();
+      dropping.value = true;
+    },
+    on,
+  );
+  addEventListener(
+    "dragleave",
+    (event) => {
+      if (!event.relatedTarget) dropping.value = false;
+    },
+    on,
+  );
+  addEventListener(
+    "drop",
+    (event) => {
+      dropping.value = false;
+      if (!event.dataTransfer || !hasFiles(event)) return;
+      event.preventDefault();
+      const into = compare.value?.mesh ? compareFiles : (files: Parameters<typeof openFiles>[0]) => openFiles(files);
+      void filesOfDrop(event.dataTransfer).then(into);
+    },
+    on,
+  );
+  addEventListener(
+    "keydown",
+    (event) => {
+      const typing =
+        event.target instanceof HTMLInputElement && /^(text|search|number|password)$/.test(event.target.type);
+      if (!(event.ctrlKey || event.metaKey) || typing) return;
+      const key = event.key.toLowerCase();
+      if (key === "z" && !event.shiftKey) undo();
+      else if ((key === "z" && event.shiftKey) || key === "y") redo();
+      else return;
+      event.preventDefault();
+    },
+    on,
+  );
   return () => off.abort();
 }

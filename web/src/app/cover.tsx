@@ -14,11 +14,16 @@ export function Cover() {
   const state = phase.value;
   if (needsKey.value) return <KeyForm />;
   switch (state.kind) {
-    case "open": return null;
-    case "sending": return <Sending name={state.name} share={state.share} />;
-    case "refused": return <Refused />;
-    case "lost": return <Lost />;
-    case "empty": return <Empty />;
+    case "open":
+      return null;
+    case "sending":
+      return <Sending name={state.name} share={state.share} />;
+    case "refused":
+      return <Refused />;
+    case "lost":
+      return <Lost />;
+    case "empty":
+      return <Empty />;
   }
 }
 
@@ -30,12 +35,21 @@ function Empty() {
       <h2 class="title">{strings.open.heading}</h2>
       <p>{strings.open.what}</p>
       <Openers />
-      <p class="quiet">{strings.open.formats(formats)}. {capabilities.value && strings.open.limit(capabilities.value.limits.body_bytes)}</p>
+      <p class="quiet">
+        {strings.open.formats(formats)}.{" "}
+        {capabilities.value && strings.open.limit(capabilities.value.limits.body_bytes)}
+      </p>
       <p class="quiet">{strings.open.privacy(location.host)}</p>
       <div class="without">
         <span class="quiet">{strings.open.without}</span>
-        <pre tabIndex={0} data-test="curl">{strings.open.curl(address("v1/render"))}</pre>
-        <p class="quiet"><a href={address("openapi.json")}>{strings.open.interface}</a> · <a href={address("v1/schema")}>{strings.open.schema}</a> · <a href={address("status")}>{strings.status.title}</a></p>
+        <pre tabIndex={0} data-test="curl">
+          {strings.open.curl(address("v1/render"))}
+        </pre>
+        <p class="quiet">
+          <a href={address("openapi.json")}>{strings.open.interface}</a> ·{" "}
+          <a href={address("v1/schema")}>{strings.open.schema}</a> ·{" "}
+          <a href={address("status")}>{strings.status.title}</a>
+        </p>
       </div>
     </div>
   );
@@ -44,7 +58,13 @@ function Empty() {
 function DropMark() {
   return (
     <svg class="mark" viewBox="0 0 64 64" width="64" height="64" aria-hidden="true">
-      <path d="M32 6 56 19v26L32 58 8 45V19Z M8 19l24 13 24-13 M32 32v26" fill="none" stroke="currentColor" stroke-width="1.5" stroke-linejoin="round" />
+      <path
+        d="M32 6 56 19v26L32 58 8 45V19Z M8 19l24 13 24-13 M32 32v26"
+        fill="none"
+        stroke="currentColor"
+        stroke-width="1.5"
+        stroke-linejoin="round"
+      />
     </svg>
   );
 }
@@ -59,11 +79,24 @@ function Openers() {
   };
   return (
     <div class="openers">
-      <button type="button" class="primary" onClick={() => files.current?.click()} data-test="choose-files">{strings.open.files}</button>
-      <button type="button" onClick={() => folder.current?.click()} data-test="choose-folder">{strings.open.folder}</button>
-      <button type="button" onClick={() => void openSample()} data-test="sample">{strings.open.sample}</button>
+      <button type="button" class="primary" onClick={() => files.current?.click()} data-test="choose-files">
+        {strings.open.files}
+      </button>
+      <button type="button" onClick={() => folder.current?.click()} data-test="choose-folder">
+        {strings.open.folder}
+      </button>
+      <button type="button" onClick={() => void openSample()} data-test="sample">
+        {strings.open.sample}
+      </button>
       <input ref={files} type="file" multiple hidden onChange={(e) => take(e.currentTarget)} data-test="files-input" />
-      <input ref={folder} type="file" hidden {...{ webkitdirectory: true }} onChange={(e) => take(e.currentTarget)} data-test="folder-input" />
+      <input
+        ref={folder}
+        type="file"
+        hidden
+        {...{ webkitdirectory: true }}
+        onChange={(e) => take(e.currentTarget)}
+        data-test="folder-input"
+      />
     </div>
   );
 }
@@ -73,7 +106,9 @@ function Sending({ name, share }: { name: string; share: number }) {
     <div class="cover" data-test="sending">
       <h2 class="title">{share < 1 ? strings.open.sending(name) : strings.open.reading}</h2>
       <progress value={share < 1 ? share : undefined} max={1} aria-label={strings.open.sending(name)} />
-      <button type="button" onClick={cancelUpload}>{strings.open.cancel}</button>
+      <button type="button" onClick={cancelUpload}>
+        {strings.open.cancel}
+      </button>
     </div>
   );
 }
@@ -84,13 +119,25 @@ function Refused() {
   const files = lastFiles();
   return (
     <div class="cover" data-test="refused">
-      {state.choices.length > 0 && files ? <Choices paths={state.choices} files={files} /> : <>
-        <h2 class="title"><bdi>{strings.refused.heading(state.name)}</bdi></h2>
-        <p role="alert" class="refusal-text" data-test="refusal" data-code={state.code}>{state.detail}</p>
-        {state.flag && !state.detail.includes(state.flag) && <p class="quiet">{strings.refused.flag(state.flag)}</p>}
-      </>}
+      {state.choices.length > 0 && files ? (
+        <Choices paths={state.choices} files={files} />
+      ) : (
+        <>
+          <h2 class="title">
+            <bdi>{strings.refused.heading(state.name)}</bdi>
+          </h2>
+          <p role="alert" class="refusal-text" data-test="refusal" data-code={state.code}>
+            {state.detail}
+          </p>
+          {state.flag && !state.detail.includes(state.flag) && <p class="quiet">{strings.refused.flag(state.flag)}</p>}
+        </>
+      )}
       <Openers />
-      {mesh.value && <button type="button" class="link" onClick={() => (phase.value = { kind: "open" })}>{strings.refused.back}</button>}
+      {mesh.value && (
+        <button type="button" class="link" onClick={() => (phase.value = { kind: "open" })}>
+          {strings.refused.back}
+        </button>
+      )}
     </div>
   );
 }
@@ -100,9 +147,15 @@ function Choices({ paths, files }: { paths: string[]; files: NamedFile[] }) {
   return (
     <>
       <h2 class="title">{strings.refused.choose}</h2>
-      <ul class="choices">{paths.slice(0, 100).map((path) => (
-        <li key={path}><button type="button" onClick={() => void openFiles(files, path)} data-test={`entry-${path}`}><bdi>{path}</bdi></button></li>
-      ))}</ul>
+      <ul class="choices">
+        {paths.slice(0, 100).map((path) => (
+          <li key={path}>
+            <button type="button" onClick={() => void openFiles(files, path)} data-test={`entry-${path}`}>
+              <bdi>{path}</bdi>
+            </button>
+          </li>
+        ))}
+      </ul>
     </>
   );
 }
@@ -113,7 +166,9 @@ function Lost() {
   return (
     <div class="cover" data-test="lost">
       <h2 class="title">{strings.lost.heading}</h2>
-      <p><bdi>{strings.lost.text(state.name)}</bdi></p>
+      <p>
+        <bdi>{strings.lost.text(state.name)}</bdi>
+      </p>
       <Openers />
     </div>
   );
@@ -132,10 +187,18 @@ function KeyForm() {
     <form class="cover" onSubmit={use} data-test="key-form">
       <h2 class="title">{strings.key.heading}</h2>
       <p class="quiet">{strings.key.text}</p>
-      {keyIsWrong.value && <p role="alert" class="refusal-text" data-test="key-wrong">{strings.key.wrong}</p>}
+      {keyIsWrong.value && (
+        <p role="alert" class="refusal-text" data-test="key-wrong">
+          {strings.key.wrong}
+        </p>
+      )}
       <div class="openers">
-        <label class="key-label">{strings.key.label} <input ref={input} type="password" autocomplete="off" data-test="key" /></label>
-        <button type="submit" class="primary" data-test="key-use">{strings.key.save}</button>
+        <label class="key-label">
+          {strings.key.label} <input ref={input} type="password" autocomplete="off" data-test="key" />
+        </label>
+        <button type="submit" class="primary" data-test="key-use">
+          {strings.key.save}
+        </button>
       </div>
     </form>
   );

@@ -14,20 +14,58 @@ export function Header() {
   const isOpen = open && phase.value.kind === "open";
   return (
     <header class="top">
-      <h1 class="brand"><a href="#" title={strings.home} data-test="home">{strings.name}</a></h1>
-      {isOpen && <span class="file" title={open.name}><bdi data-test="mesh-name">{open.name}</bdi>
-        {report.value && <span class="quiet"> {strings.content(report.value)}</span>}</span>}
+      <h1 class="brand">
+        <a href="#" title={strings.home} data-test="home">
+          {strings.name}
+        </a>
+      </h1>
+      {isOpen && (
+        <span class="file" title={open.name}>
+          <bdi data-test="mesh-name">{open.name}</bdi>
+          {report.value && <span class="quiet"> {strings.content(report.value)}</span>}
+        </span>
+      )}
       <span class="spring" />
-      {apiKey.value && <button type="button" class="link" onClick={() => { forgetKey(); location.reload(); }} data-test="key-forget">{strings.key.forget}</button>}
-      {isOpen && <>
-        <button type="button" onClick={() => void copyText(shareLink(), "share")} title={strings.copy.shareHelp} data-test="share">{strings.copy.share}</button>
-        <button type="button" onClick={() => input.current?.click()} data-test="open">{strings.open.another}</button>
-        <input ref={input} type="file" multiple hidden data-test="open-input" onChange={(e) => {
-          const files = filesOfInput(e.currentTarget.files!);
-          e.currentTarget.value = "";
-          if (files.length > 0) void openFiles(files);
-        }} />
-      </>}
+      {apiKey.value && (
+        <button
+          type="button"
+          class="link"
+          onClick={() => {
+            forgetKey();
+            location.reload();
+          }}
+          data-test="key-forget"
+        >
+          {strings.key.forget}
+        </button>
+      )}
+      {isOpen && (
+        <>
+          <button
+            type="button"
+            onClick={() => void copyText(shareLink(), "share")}
+            title={strings.copy.shareHelp}
+            data-test="share"
+          >
+            {strings.copy.share}
+          </button>
+          <button type="button" onClick={() => input.current?.click()} data-test="open">
+            {strings.open.another}
+          </button>
+          <input
+            ref={input}
+            type="file"
+            multiple
+            hidden
+            data-test="open-input"
+            onChange={(e) => {
+              const files = filesOfInput(e.currentTarget.files!);
+              e.currentTarget.value = "";
+              if (files.length > 0) void openFiles(files);
+            }}
+          />
+        </>
+      )}
     </header>
   );
 }

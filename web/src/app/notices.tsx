@@ -17,10 +17,19 @@ export function Notices() {
   }, [waits]);
   return (
     <>
-      {state.kind === "gone" && <div class="notice" role="status" data-test="gone">{strings.connection.gone}</div>}
-      {waits && <div class="notice" role="status" data-test="waiting" title={state.detail}>
-        {strings.connection.waiting(Math.max(1, Math.ceil((state.untilMs - now.value) / 1000)))}</div>}
-      <div class="unseen" aria-live="polite" data-test="live">{announcement.value}</div>
+      {state.kind === "gone" && (
+        <div class="notice" role="status" data-test="gone">
+          {strings.connection.gone}
+        </div>
+      )}
+      {waits && (
+        <div class="notice" role="status" data-test="waiting" title={state.detail}>
+          {strings.connection.waiting(Math.max(1, Math.ceil((state.untilMs - now.value) / 1000)))}
+        </div>
+      )}
+      <div class="unseen" aria-live="polite" data-test="live">
+        {announcement.value}
+      </div>
     </>
   );
 }

@@ -113,7 +113,10 @@ export function flyTo(points: Vec[]): void {
   const first = points[0];
   if (!bounds || !first || !points.every(isVec)) return;
   const whole = length(sub(bounds.max, bounds.min)) || 1;
-  const middle = scale(points.reduce((a, b) => add(a, b), [0, 0, 0] as Vec), 1 / points.length);
+  const middle = scale(
+    points.reduce((a, b) => add(a, b), [0, 0, 0] as Vec),
+    1 / points.length,
+  );
   const spread = Math.max(...points.map((p) => length(sub(p, middle))));
   const far = Math.max(spread * 8, whole * 0.35);
   const outwards = unit(sub(middle, scale(add(bounds.min, bounds.max), 0.5))) ?? [0, 0, 1];

@@ -28,12 +28,30 @@ const VIEWS: Record<string, Angles> = {
 /** Model right, up and front for an up axis, as the server has them. */
 export function frameOf(up: string): [Vec, Vec, Vec] {
   const axes: Record<string, [Vec, Vec]> = {
-    "y": [[1, 0, 0], [0, 1, 0]],
-    "-y": [[1, 0, 0], [0, -1, 0]],
-    "z": [[1, 0, 0], [0, 0, 1]],
-    "-z": [[1, 0, 0], [0, 0, -1]],
-    "x": [[0, -1, 0], [1, 0, 0]],
-    "-x": [[0, 1, 0], [-1, 0, 0]],
+    "y": [
+      [1, 0, 0],
+      [0, 1, 0],
+    ],
+    "-y": [
+      [1, 0, 0],
+      [0, -1, 0],
+    ],
+    "z": [
+      [1, 0, 0],
+      [0, 0, 1],
+    ],
+    "-z": [
+      [1, 0, 0],
+      [0, 0, -1],
+    ],
+    "x": [
+      [0, -1, 0],
+      [1, 0, 0],
+    ],
+    "-x": [
+      [0, 1, 0],
+      [-1, 0, 0],
+    ],
   };
   const [right, upwards] = axes[up] ?? axes["y"]!;
   return [right, upwards, cross(right, upwards)];

@@ -31,10 +31,36 @@ function Sides() {
   });
   return (
     <>
-      {besideShown.value && <img ref={image} class="shot beside" src={besideShown.value.url} alt={strings.compare.left} draggable={false} data-test="beside" />}
-      <div ref={handle} class="divider" onPointerDown={(event) => drag(event, width)} onDblClick={(e) => { e.stopPropagation(); divider.value = 0.5; }}>
-        <input type="range" min="0" max="1" step="0.01" value={at} aria-label={strings.compare.divider} data-test="divider"
-          onInput={(e) => (divider.value = Number(e.currentTarget.value))} onKeyDown={(e) => e.stopPropagation()} />
+      {besideShown.value && (
+        <img
+          ref={image}
+          class="shot beside"
+          src={besideShown.value.url}
+          alt={strings.compare.left}
+          draggable={false}
+          data-test="beside"
+        />
+      )}
+      <div
+        ref={handle}
+        class="divider"
+        onPointerDown={(event) => drag(event, width)}
+        onDblClick={(e) => {
+          e.stopPropagation();
+          divider.value = 0.5;
+        }}
+      >
+        <input
+          type="range"
+          min="0"
+          max="1"
+          step="0.01"
+          value={at}
+          aria-label={strings.compare.divider}
+          data-test="divider"
+          onInput={(e) => (divider.value = Number(e.currentTarget.value))}
+          onKeyDown={(e) => e.stopPropagation()}
+        />
       </div>
     </>
   );
@@ -73,8 +99,12 @@ export function SideNames() {
   if (!compared || heat.value) return null;
   return (
     <>
-      <span class="side-name is-left"><bdi>{compared.mesh?.name ?? strings.compare.kept}</bdi></span>
-      <span class="side-name is-right"><bdi>{compared.mesh ? mesh.value?.name : strings.compare.now}</bdi></span>
+      <span class="side-name is-left">
+        <bdi>{compared.mesh?.name ?? strings.compare.kept}</bdi>
+      </span>
+      <span class="side-name is-right">
+        <bdi>{compared.mesh ? mesh.value?.name : strings.compare.now}</bdi>
+      </span>
     </>
   );
 }
@@ -84,7 +114,13 @@ export function HeatText() {
   const found = figures.value;
   if (!compare.value || !heat.value || !found) return null;
   if (found === "other") return <span class="side-name is-left">{strings.compare.differing}</span>;
-  const text = found.most === 0 ? strings.compare.same
-    : strings.compare.figures(found.rmse.toFixed(2), found.most, (found.share * 100).toFixed(2));
-  return <span class="side-name is-left" data-test="heat-figures">{text}</span>;
+  const text =
+    found.most === 0
+      ? strings.compare.same
+      : strings.compare.figures(found.rmse.toFixed(2), found.most, (found.share * 100).toFixed(2));
+  return (
+    <span class="side-name is-left" data-test="heat-figures">
+      {text}
+    </span>
+  );
 }

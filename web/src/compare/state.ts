@@ -34,7 +34,9 @@ const loop = new PictureLoop({
 
 /** The left side's picture: its own look, seen as the right side is. */
 export function besideOf(picture: Picture, compared: Compared): Picture {
-  const view = Object.entries(picture.look.keys).filter(([key]) => isView(key) || /^camera\.(up|projection|fov_deg|margin)$/.test(key));
+  const view = Object.entries(picture.look.keys).filter(
+    ([key]) => isView(key) || /^camera\.(up|projection|fov_deg|margin)$/.test(key),
+  );
   const kept = Object.entries(compared.look.keys).filter(([key]) => !key.startsWith("camera."));
   if (compared.mesh) return { ...picture, mesh: compared.mesh };
   return { ...picture, look: { ...compared.look, keys: Object.fromEntries([...kept, ...view]) } };

@@ -33,17 +33,47 @@ export function ColourInput({ id, edit, fallback, mayBeNone }: Props) {
   };
   return (
     <div class="colour">
-      <input type="color" value={opaque(text || "#808080")} class={text ? "" : "is-unset"} aria-label={strings.controls.picker(id)}
-        onInput={(e) => { touch(); edit.set(e.currentTarget.value); }} />
-      <input type="text" id={id} value={edit.value === null ? none : text} placeholder={mayBeNone ? none : strings.controls.byDefault} spellcheck={false}
-        onChange={(e) => pick(e.currentTarget.value.trim())} />
+      <input
+        type="color"
+        value={opaque(text || "#808080")}
+        class={text ? "" : "is-unset"}
+        aria-label={strings.controls.picker(id)}
+        onInput={(e) => {
+          touch();
+          edit.set(e.currentTarget.value);
+        }}
+      />
+      <input
+        type="text"
+        id={id}
+        value={edit.value === null ? none : text}
+        placeholder={mayBeNone ? none : strings.controls.byDefault}
+        spellcheck={false}
+        onChange={(e) => pick(e.currentTarget.value.trim())}
+      />
       <span class="swatches">
         {SWATCHES.map((colour) => (
-          <button type="button" key={colour} class={`swatch s${colour.slice(1)}`} title={colour} tabIndex={-1}
-            aria-label={strings.controls.swatch(id, colour)} onClick={() => pick(colour)} />
+          <button
+            type="button"
+            key={colour}
+            class={`swatch s${colour.slice(1)}`}
+            title={colour}
+            tabIndex={-1}
+            aria-label={strings.controls.swatch(id, colour)}
+            onClick={() => pick(colour)}
+          />
         ))}
-        {mayBeNone && <button type="button" class="small" aria-pressed={edit.value === null} onClick={() => pick(none)}
-          data-test={`none-${id}`}>{none}</button>}
+        {mayBeNone && (
+          <button
+            type="button"
+            class="small"
+            aria-pressed={edit.value === null}
+            onClick={() => pick(none)}
+            data-test={`none-${id}`}
+          >
+            {none}
+          </button>
+        )}
       </span>
     </div>
   );

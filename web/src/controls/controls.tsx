@@ -21,15 +21,48 @@ export function Controls() {
   return (
     <div class="controls">
       <div class="controls-head">
-        <input type="search" placeholder={strings.controls.search} aria-label={strings.controls.search} value={search.value}
-          data-test="search" onInput={(e) => (search.value = e.currentTarget.value)} />
-        <button type="button" onClick={undo} disabled={!canUndo.value} title={strings.controls.undo} aria-label={strings.controls.undo} data-test="undo">↶</button>
-        <button type="button" onClick={redo} disabled={!canRedo.value} title={strings.controls.redo} aria-label={strings.controls.redo} data-test="redo">↷</button>
-        <button type="button" onClick={resetAll} data-test="reset-all" title={strings.controls.resetAllHelp}>{strings.controls.resetAll}</button>
+        <input
+          type="search"
+          placeholder={strings.controls.search}
+          aria-label={strings.controls.search}
+          value={search.value}
+          data-test="search"
+          onInput={(e) => (search.value = e.currentTarget.value)}
+        />
+        <button
+          type="button"
+          onClick={undo}
+          disabled={!canUndo.value}
+          title={strings.controls.undo}
+          aria-label={strings.controls.undo}
+          data-test="undo"
+        >
+          ↶
+        </button>
+        <button
+          type="button"
+          onClick={redo}
+          disabled={!canRedo.value}
+          title={strings.controls.redo}
+          aria-label={strings.controls.redo}
+          data-test="redo"
+        >
+          ↷
+        </button>
+        <button type="button" onClick={resetAll} data-test="reset-all" title={strings.controls.resetAllHelp}>
+          {strings.controls.resetAll}
+        </button>
       </div>
       {sections.length === 0 && <p class="quiet">{strings.controls.noMatch(search.value)}</p>}
       {sections.map((section) => (
-        <SectionGroup key={section.name} section={section} keys={look.value.keys} scope="" searching={words.length > 0} put={put} />
+        <SectionGroup
+          key={section.name}
+          section={section}
+          keys={look.value.keys}
+          scope=""
+          searching={words.length > 0}
+          put={put}
+        />
       ))}
     </div>
   );
@@ -42,7 +75,8 @@ function put(section: string, key: string, value: Value | undefined): void {
 }
 
 function matches(field: Field, words: string[]): boolean {
-  const text = `${field.key.replaceAll("_", " ")} ${field.key} ${field.description} ${field.words.join(" ")}`.toLowerCase();
+  const text =
+    `${field.key.replaceAll("_", " ")} ${field.key} ${field.description} ${field.words.join(" ")}`.toLowerCase();
   return words.every((word) => text.includes(word));
 }
 
@@ -69,17 +103,27 @@ export function SectionGroup({ section, keys, scope, searching, put: set }: Grou
   };
   const name = section.name || strings.controls.general;
   return (
-    <details class="section" open={isOpen} onToggle={(e) => flip(e.currentTarget.open)} data-test={`section-${id || "general"}`}>
+    <details
+      class="section"
+      open={isOpen}
+      onToggle={(e) => flip(e.currentTarget.open)}
+      data-test={`section-${id || "general"}`}
+    >
       <summary>
         <span class="section-name">{name}</span>
-        {count > 0 && section.name && <span class="count" title={strings.controls.setKeys(count)}>{count}</span>}
+        {count > 0 && section.name && (
+          <span class="count" title={strings.controls.setKeys(count)}>
+            {count}
+          </span>
+        )}
         <span class="section-text">{section.description}</span>
       </summary>
       {isOpen && section.layer && <LayerSwitch section={section} keys={keys} scope={scope} put={set} />}
-      {isOpen && section.fields.map((field) => {
-        const edit: Edit = { value: keys[field.key], set: (value) => set(section.name, field.key, value), scope };
-        return <FieldRow key={field.key} field={field} edit={edit} explain={searching} />;
-      })}
+      {isOpen &&
+        section.fields.map((field) => {
+          const edit: Edit = { value: keys[field.key], set: (value) => set(section.name, field.key, value), scope };
+          return <FieldRow key={field.key} field={field} edit={edit} explain={searching} />;
+        })}
     </details>
   );
 }
@@ -99,11 +143,23 @@ function LayerSwitch({ section, keys, scope, put: set }: Omit<GroupProps, "searc
   const label = section.name === "sheet" ? strings.controls.none : strings.controls.byStyle;
   return (
     <div class="segments layer" role="group" aria-label={strings.controls.layer(section.name)}>
-      {[["style", label], ["on", strings.controls.on], ["off", strings.controls.off]]
+      {[
+        ["style", label],
+        ["on", strings.controls.on],
+        ["off", strings.controls.off],
+      ]
         .filter(([value]) => !(section.name === "sheet" && value === "off"))
         .map(([value, text]) => (
-          <button type="button" class="segment" key={value} aria-pressed={state === value}
-            data-test={`layer-${scope}${section.name}-${value}`} onClick={() => choose(value ?? "")}>{text}</button>
+          <button
+            type="button"
+            class="segment"
+            key={value}
+            aria-pressed={state === value}
+            data-test={`layer-${scope}${section.name}-${value}`}
+            onClick={() => choose(value ?? "")}
+          >
+            {text}
+          </button>
         ))}
     </div>
   );

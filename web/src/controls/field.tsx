@@ -30,16 +30,46 @@ export function FieldRow({ field, edit, explain }: { field: Field; edit: Edit; e
   return (
     <div class={classes} data-test={`field-${id}`} data-key={id}>
       <div class="field-head">
-        <label for={id} id={`${id}-label`}>{label}{unit && <span class="unit">{unit === "°" ? unit : `\u00a0${unit}`}</span>}</label>
-        <button class="help" type="button" aria-expanded={open} aria-label={strings.controls.help(field.key)}
-          onClick={() => (helpOf.value = open ? null : id)}>?</button>
+        <label for={id} id={`${id}-label`}>
+          {label}
+          {unit && <span class="unit">{unit === "°" ? unit : `\u00a0${unit}`}</span>}
+        </label>
+        <button
+          class="help"
+          type="button"
+          aria-expanded={open}
+          aria-label={strings.controls.help(field.key)}
+          onClick={() => (helpOf.value = open ? null : id)}
+        >
+          ?
+        </button>
       </div>
       <Control field={field} edit={edit} id={id} />
-      {isSet && <button class="reset" type="button" title={strings.controls.reset(field.key)}
-        aria-label={strings.controls.reset(field.key)} data-test={`reset-${id}`}
-        onClick={() => { endStep(); edit.set(undefined); }}>↺</button>}
-      {open && <p class="description" id={`${id}-help`}>{field.description} <code>{id}</code></p>}
-      {refused && <p class="refusal" role="alert">{pictureRefusal.value?.message}</p>}
+      {isSet && (
+        <button
+          class="reset"
+          type="button"
+          title={strings.controls.reset(field.key)}
+          aria-label={strings.controls.reset(field.key)}
+          data-test={`reset-${id}`}
+          onClick={() => {
+            endStep();
+            edit.set(undefined);
+          }}
+        >
+          ↺
+        </button>
+      )}
+      {open && (
+        <p class="description" id={`${id}-help`}>
+          {field.description} <code>{id}</code>
+        </p>
+      )}
+      {refused && (
+        <p class="refusal" role="alert">
+          {pictureRefusal.value?.message}
+        </p>
+      )}
     </div>
   );
 }
@@ -53,17 +83,31 @@ interface Props {
 function Control(props: Props) {
   if (props.field.key === "scene.section") return <SectionPlanes edit={props.edit} id={props.id} />;
   switch (props.field.kind) {
-    case "choice": return <Choice {...props} />;
-    case "boolean": return <Switch {...props} />;
-    case "number": return <Numeric {...props} />;
-    case "colour": return <ColourInput id={props.id} edit={props.edit} fallback={props.field.default} mayBeNone={props.field.section === "topology"} />;
-    case "list": return <Several {...props} />;
-    default: return <TextInput {...props} />;
+    case "choice":
+      return <Choice {...props} />;
+    case "boolean":
+      return <Switch {...props} />;
+    case "number":
+      return <Numeric {...props} />;
+    case "colour":
+      return (
+        <ColourInput
+          id={props.id}
+          edit={props.edit}
+          fallback={props.field.default}
+          mayBeNone={props.field.section === "topology"}
+        />
+      );
+    case "list":
+      return <Several {...props} />;
+    default:
+      return <TextInput {...props} />;
   }
 }
 
 function Choice({ field, edit, id }: Props) {
-  const standard = field.default === undefined || field.default === null ? strings.controls.byDefault : String(field.default);
+  const standard =
+    field.default === undefined || field.default === null ? strings.controls.byDefault : String(field.default);
   const pick = (text: string) => {
     endStep();
     edit.set(text === "" ? undefined : field.words.find((word) => String(word) === text));
@@ -74,28 +118,59 @@ function Choice({ field, edit, id }: Props) {
     return (
       <Group labelled={`${id}-label`} id={id}>
         {words.map((word) => (
-          <button type="button" class="segment" aria-pressed={current === word} key={word}
-            data-test={`choice-${id}-${word}`} onClick={() => pick(String(word))}>{word}</button>
+          <button
+            type="button"
+            class="segment"
+            aria-pressed={current === word}
+            key={word}
+            data-test={`choice-${id}-${word}`}
+            onClick={() => pick(String(word))}
+          >
+            {word}
+          </button>
         ))}
       </Group>
     );
   }
   return (
-    <select id={id} value={edit.value === undefined ? "" : String(edit.value)} onChange={(e) => pick(e.currentTarget.value)}>
+    <select
+      id={id}
+      value={edit.value === undefined ? "" : String(edit.value)}
+      onChange={(e) => pick(e.currentTarget.value)}
+    >
       <option value="">{strings.controls.standard(standard)}</option>
-      {words.map((word) => <option value={String(word)} key={word}>{word}</option>)}
+      {words.map((word) => (
+        <option value={String(word)} key={word}>
+          {word}
+        </option>
+      ))}
     </select>
   );
 }
 
 function Group({ labelled, id, children }: { labelled: string; id: string; children: ComponentChildren }) {
-  return <div class="segments" role="group" aria-labelledby={labelled} id={id}>{children}</div>;
+  return (
+    <div class="segments" role="group" aria-labelledby={labelled} id={id}>
+      {children}
+    </div>
+  );
 }
 
 function Switch({ field, edit, id }: Props) {
   const on = (edit.value ?? field.default) === true;
-  return <input type="checkbox" class="switch" role="switch" id={id} checked={on}
-    onChange={(e) => { endStep(); edit.set(e.currentTarget.checked); }} />;
+  return (
+    <input
+      type="checkbox"
+      class="switch"
+      role="switch"
+      id={id}
+      checked={on}
+      onChange={(e) => {
+        endStep();
+        edit.set(e.currentTarget.checked);
+      }}
+    />
+  );
 }
 
 function Numeric({ field, edit, id }: Props) {
@@ -110,15 +185,37 @@ function Numeric({ field, edit, id }: Props) {
   const hint = field.words.length > 0 ? field.words.join(", ") : strings.controls.byDefault;
   return (
     <div class="numeric">
-      {range && <input type="range" {...range} step={range.step} value={number ?? range.min} tabIndex={-1}
-        class={number === null ? "is-unset" : ""} aria-label={strings.controls.slider(field.key)}
-        onPointerDown={() => { endStep(); hold(true); }} onPointerUp={() => hold(false)} onPointerCancel={() => hold(false)} onChange={() => hold(false)}
-        onInput={(e) => put(e.currentTarget.value)} />}
-      <input type="text" id={id} inputMode="decimal"
+      {range && (
+        <input
+          type="range"
+          {...range}
+          step={range.step}
+          value={number ?? range.min}
+          tabIndex={-1}
+          class={number === null ? "is-unset" : ""}
+          aria-label={strings.controls.slider(field.key)}
+          onPointerDown={() => {
+            endStep();
+            hold(true);
+          }}
+          onPointerUp={() => hold(false)}
+          onPointerCancel={() => hold(false)}
+          onChange={() => hold(false)}
+          onInput={(e) => put(e.currentTarget.value)}
+        />
+      )}
+      <input
+        type="text"
+        id={id}
+        inputMode="decimal"
         placeholder={number === null ? hint : ""}
-        value={edit.value === undefined || edit.value === null ? String(number ?? (field.words[0] ?? "")) : String(edit.value)}
-        onFocus={endStep} onChange={(e) => put(e.currentTarget.value.trim())}
-        onKeyDown={(e) => stepByKey(e, number ?? range?.min ?? 0, range?.step ?? 1, put)} />
+        value={
+          edit.value === undefined || edit.value === null ? String(number ?? field.words[0] ?? "") : String(edit.value)
+        }
+        onFocus={endStep}
+        onChange={(e) => put(e.currentTarget.value.trim())}
+        onKeyDown={(e) => stepByKey(e, number ?? range?.min ?? 0, range?.step ?? 1, put)}
+      />
     </div>
   );
 }
@@ -142,7 +239,15 @@ function Several({ field, edit, id }: Props) {
   return (
     <Group labelled={`${id}-label`} id={id}>
       {field.words.map((word) => (
-        <button type="button" class="segment" aria-pressed={stated.includes(word)} key={word} onClick={() => flip(word)}>{word}</button>
+        <button
+          type="button"
+          class="segment"
+          aria-pressed={stated.includes(word)}
+          key={word}
+          onClick={() => flip(word)}
+        >
+          {word}
+        </button>
       ))}
     </Group>
   );
@@ -157,7 +262,16 @@ function TextInput({ field, edit, id }: Props) {
     edit.set(typed.trim() === "" ? undefined : readText(field, typed));
   };
   const hint = field.kind === "vector" ? "x, y, z" : strings.controls.byDefault;
-  return <input type="text" id={id} value={text} placeholder={hint} spellcheck={false} onChange={(e) => put(e.currentTarget.value)} />;
+  return (
+    <input
+      type="text"
+      id={id}
+      value={text}
+      placeholder={hint}
+      spellcheck={false}
+      onChange={(e) => put(e.currentTarget.value)}
+    />
+  );
 }
 
 function writeText(value: Value): string {
@@ -166,7 +280,12 @@ function writeText(value: Value): string {
 }
 
 function readText(field: Field, typed: string): Value {
-  if (field.kind === "vector") return typed.split(/[\s,]+/).filter(Boolean).map((part) => Number(part)).filter(Number.isFinite);
+  if (field.kind === "vector")
+    return typed
+      .split(/[\s,]+/)
+      .filter(Boolean)
+      .map((part) => Number(part))
+      .filter(Number.isFinite);
   if (field.kind !== "json") return typed.trim();
   try {
     return JSON.parse(typed) as Value;

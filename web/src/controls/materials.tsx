@@ -21,14 +21,28 @@ export function Materials() {
   return (
     <div class="materials" data-test="materials">
       <p class="quiet">{strings.materials.help}</p>
-      {names.length > 8 && <input type="search" placeholder={strings.materials.search(names.length)}
-        aria-label={strings.materials.search(names.length)} value={filter.value}
-        onInput={(e) => { filter.value = e.currentTarget.value; more.value = SHOWN_AT_ONCE; }} />}
+      {names.length > 8 && (
+        <input
+          type="search"
+          placeholder={strings.materials.search(names.length)}
+          aria-label={strings.materials.search(names.length)}
+          value={filter.value}
+          onInput={(e) => {
+            filter.value = e.currentTarget.value;
+            more.value = SHOWN_AT_ONCE;
+          }}
+        />
+      )}
       <ul class="material-list">
-        {found.slice(0, more.value).map((name) => <Material key={name} name={name} />)}
+        {found.slice(0, more.value).map((name) => (
+          <Material key={name} name={name} />
+        ))}
       </ul>
-      {found.length > more.value && <button type="button" onClick={() => (more.value += SHOWN_AT_ONCE)}>
-        {strings.materials.more(found.length - more.value)}</button>}
+      {found.length > more.value && (
+        <button type="button" onClick={() => (more.value += SHOWN_AT_ONCE)}>
+          {strings.materials.more(found.length - more.value)}
+        </button>
+      )}
     </div>
   );
 }
@@ -43,14 +57,28 @@ function Material({ name }: { name: string }) {
   };
   return (
     <li>
-      <button type="button" class="material" aria-expanded={open} data-test={`material-${name}`}
-        onClick={() => (chosen.value = open ? null : name)}>
+      <button
+        type="button"
+        class="material"
+        aria-expanded={open}
+        data-test={`material-${name}`}
+        onClick={() => (chosen.value = open ? null : name)}
+      >
         <bdi>{name}</bdi>
         {count > 0 && <span class="count">{count}</span>}
       </button>
-      {open && schema.value && materialSectionsOf(schema.value).map((section) => (
-        <SectionGroup key={section.name} section={section} keys={keys} scope={`materials.${name}.`} searching={false} put={put} />
-      ))}
+      {open &&
+        schema.value &&
+        materialSectionsOf(schema.value).map((section) => (
+          <SectionGroup
+            key={section.name}
+            section={section}
+            keys={keys}
+            scope={`materials.${name}.`}
+            searching={false}
+            put={put}
+          />
+        ))}
     </li>
   );
 }

@@ -26,13 +26,42 @@ export function SectionPlanes({ edit, id }: { edit: Edit; id: string }) {
   return (
     <div class="section-planes">
       <div class="segments" role="group" aria-labelledby={`${id}-label`}>
-        {AXES.map((axis) => <button type="button" class="segment" key={axis} aria-pressed={plane?.axis === axis}
-          data-test={`choice-${id}-${axis}`}
-          onClick={() => { endStep(); if (plane?.axis === axis) edit.set(undefined); else put(axis, plane?.share ?? 50); }}>{axis}</button>)}
+        {AXES.map((axis) => (
+          <button
+            type="button"
+            class="segment"
+            key={axis}
+            aria-pressed={plane?.axis === axis}
+            data-test={`choice-${id}-${axis}`}
+            onClick={() => {
+              endStep();
+              if (plane?.axis === axis) edit.set(undefined);
+              else put(axis, plane?.share ?? 50);
+            }}
+          >
+            {axis}
+          </button>
+        ))}
       </div>
-      {plane && <input type="range" id={id} min={0} max={100} step={1} value={plane.share} aria-label={strings.controls.slider(id)}
-        onPointerDown={() => { endStep(); hold(true); }} onPointerUp={() => hold(false)} onPointerCancel={() => hold(false)} onChange={() => hold(false)}
-        onInput={(e) => put(plane.axis, Number(e.currentTarget.value))} />}
+      {plane && (
+        <input
+          type="range"
+          id={id}
+          min={0}
+          max={100}
+          step={1}
+          value={plane.share}
+          aria-label={strings.controls.slider(id)}
+          onPointerDown={() => {
+            endStep();
+            hold(true);
+          }}
+          onPointerUp={() => hold(false)}
+          onPointerCancel={() => hold(false)}
+          onChange={() => hold(false)}
+          onInput={(e) => put(plane.axis, Number(e.currentTarget.value))}
+        />
+      )}
     </div>
   );
 }

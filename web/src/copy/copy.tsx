@@ -23,7 +23,9 @@ function signWhenAsked(): void {
   if (kind.value !== "signed" || !key || !picture) return;
   const url = pictureAddress(picture);
   const isNewest = () => finished.peek()?.picture === picture && kind.peek() === "signed";
-  signedAndTried(url, key).then((made) => isNewest() && (signedAddress.value = made)).catch(() => undefined);
+  signedAndTried(url, key)
+    .then((made) => isNewest() && (signedAddress.value = made))
+    .catch(() => undefined);
 }
 
 const SIZES = ["256", "512", "1024", "800x600", "1280x720", "1920x1080"];
@@ -56,15 +58,34 @@ export function CopyPanel() {
         <DownloadButton />
       </div>
       <div class="kinds" role="group" aria-label={strings.copy.heading}>
-        {KINDS.map((name) => <button type="button" key={name} class="segment" aria-pressed={kind.value === name}
-          data-test={`copy-${name}`} onClick={() => (kind.value = name)}>{strings.copy.kinds[name]}</button>)}
+        {KINDS.map((name) => (
+          <button
+            type="button"
+            key={name}
+            class="segment"
+            aria-pressed={kind.value === name}
+            data-test={`copy-${name}`}
+            onClick={() => (kind.value = name)}
+          >
+            {strings.copy.kinds[name]}
+          </button>
+        ))}
       </div>
       <div class="line">
-        <pre tabIndex={0} data-test="copy-text" aria-label={strings.copy.kinds[kind.value]}>{text}</pre>
+        <pre tabIndex={0} data-test="copy-text" aria-label={strings.copy.kinds[kind.value]}>
+          {text}
+        </pre>
         <button type="button" class="primary" data-test="copy" onClick={() => void copyText(text, "line")}>
-          {copied.value === "line" ? strings.copy.copied : strings.copy.copy}</button>
+          {copied.value === "line" ? strings.copy.copied : strings.copy.copy}
+        </button>
       </div>
-      <p class="quiet">{copied.value === "line-failed" ? strings.copy.failed : signedText ? strings.copy.signedNote : noteOf(picture, keyed)}</p>
+      <p class="quiet">
+        {copied.value === "line-failed"
+          ? strings.copy.failed
+          : signedText
+            ? strings.copy.signedNote
+            : noteOf(picture, keyed)}
+      </p>
     </section>
   );
 }
@@ -88,19 +109,48 @@ function OutputControls() {
   const formats = (capabilities.value?.image_formats ?? ["webp", "png", "jpeg"]) as Format[];
   return (
     <>
-      <label>{strings.copy.size}
+      <label>
+        {strings.copy.size}
         <select value={value} data-test="size" onChange={(e) => pick(e.currentTarget.value)}>
-          <option value="window">{chosenSize.value || !wanted.value ? strings.copy.windowAlone : strings.copy.window(sizeText(wanted.value.size))}</option>
-          {[...SIZES, ...own].map((size) => <option key={size} value={size}>{size.replace("x", " × ")}</option>)}
+          <option value="window">
+            {chosenSize.value || !wanted.value
+              ? strings.copy.windowAlone
+              : strings.copy.window(sizeText(wanted.value.size))}
+          </option>
+          {[...SIZES, ...own].map((size) => (
+            <option key={size} value={size}>
+              {size.replace("x", " × ")}
+            </option>
+          ))}
           <option value="custom">{strings.copy.custom}</option>
         </select>
       </label>
-      {custom.value && <input type="text" class="size" aria-label={strings.copy.customLabel} title={strings.copy.customLabel}
-        value={sizeText(pictureSize.value)} data-test="size-custom"
-        onChange={(e) => { const size = readSize(e.currentTarget.value); if (size) chosenSize.value = size; }} />}
-      <label>{strings.copy.format}
-        <select value={format.value} data-test="format" onChange={(e) => (format.value = e.currentTarget.value as Format)}>
-          {formats.map((name) => <option key={name} value={name}>{name}</option>)}
+      {custom.value && (
+        <input
+          type="text"
+          class="size"
+          aria-label={strings.copy.customLabel}
+          title={strings.copy.customLabel}
+          value={sizeText(pictureSize.value)}
+          data-test="size-custom"
+          onChange={(e) => {
+            const size = readSize(e.currentTarget.value);
+            if (size) chosenSize.value = size;
+          }}
+        />
+      )}
+      <label>
+        {strings.copy.format}
+        <select
+          value={format.value}
+          data-test="format"
+          onChange={(e) => (format.value = e.currentTarget.value as Format)}
+        >
+          {formats.map((name) => (
+            <option key={name} value={name}>
+              {name}
+            </option>
+          ))}
         </select>
       </label>
     </>
@@ -113,5 +163,9 @@ function DownloadButton() {
   const picture = wanted.value;
   if (!current || !picture) return null;
   const name = `${stem(picture.mesh)}.${extension(current.picture.format)}`;
-  return <a class="button" href={current.url} download={name} data-test="download">{strings.copy.download}</a>;
+  return (
+    <a class="button" href={current.url} download={name} data-test="download">
+      {strings.copy.download}
+    </a>
+  );
 }

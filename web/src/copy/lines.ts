@@ -5,7 +5,17 @@ import { stem } from "../state/mesh";
 import { extension, sizeText } from "../state/size";
 import { attribute, literal, markdown, shell } from "./quote";
 
-export const KINDS = ["url", "signed", "curl", "json", "command", "python", "javascript", "srcset", "markdown"] as const;
+export const KINDS = [
+  "url",
+  "signed",
+  "curl",
+  "json",
+  "command",
+  "python",
+  "javascript",
+  "srcset",
+  "markdown",
+] as const;
 export type LineKind = (typeof KINDS)[number];
 
 interface Context {
@@ -20,15 +30,24 @@ export function lineOf(kind: LineKind, picture: Picture, context: Context): stri
   const url = pictureAddress(picture);
   const file = `${stem(picture.mesh)}.${extension(picture.format)}`;
   switch (kind) {
-    case "url": return url;
-    case "signed": return `meshsnap sign ${shell(url)} --expires 1d`;
-    case "curl": return curl(url, file, context);
-    case "json": return JSON.stringify(requestDocument(picture), null, 2);
-    case "command": return commandLine(picture, file);
-    case "python": return python(url, file, context);
-    case "javascript": return javascript(url, context);
-    case "srcset": return srcset(picture, context);
-    case "markdown": return `![${markdown(stem(picture.mesh))}](${url})`;
+    case "url":
+      return url;
+    case "signed":
+      return `meshsnap sign ${shell(url)} --expires 1d`;
+    case "curl":
+      return curl(url, file, context);
+    case "json":
+      return JSON.stringify(requestDocument(picture), null, 2);
+    case "command":
+      return commandLine(picture, file);
+    case "python":
+      return python(url, file, context);
+    case "javascript":
+      return javascript(url, context);
+    case "srcset":
+      return srcset(picture, context);
+    case "markdown":
+      return `![${markdown(stem(picture.mesh))}](${url})`;
   }
 }
 
@@ -48,7 +67,10 @@ function requestDocument(picture: Picture): { [name: string]: Value } {
 /** Address that the request document goes to: how the mesh is read is said there. */
 export function documentAddress(picture: Picture): string {
   const { entry, formatIn } = picture.mesh;
-  const query = new URLSearchParams({ ...(entry !== null && { entry }), ...(formatIn !== null && { format_in: formatIn }) });
+  const query = new URLSearchParams({
+    ...(entry !== null && { entry }),
+    ...(formatIn !== null && { format_in: formatIn }),
+  });
   return address(`v1/render${query.size > 0 ? `?${query}` : ""}`);
 }
 

@@ -1,7 +1,8 @@
 const DAY_S = 86_400;
 const HOUR_S = 3600;
 
-const hex = (bytes: ArrayBuffer): string => [...new Uint8Array(bytes)].map((b) => b.toString(16).padStart(2, "0")).join("");
+const hex = (bytes: ArrayBuffer): string =>
+  [...new Uint8Array(bytes)].map((b) => b.toString(16).padStart(2, "0")).join("");
 
 /**
  * Adds `exp` and `sig` to an address, as `meshsnap sign` does: an HMAC of path and query by the digest of the

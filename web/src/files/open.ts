@@ -61,7 +61,12 @@ export function cancelUpload(): void {
   upload?.abort();
 }
 
-async function failed(error: unknown, files: NamedFile[], name: string, entry: string | null): Promise<OpenMesh | null> {
+async function failed(
+  error: unknown,
+  files: NamedFile[],
+  name: string,
+  entry: string | null,
+): Promise<OpenMesh | null> {
   if (error instanceof Unreachable) {
     refuse(name, strings.refused.unreachable, "unreachable");
     connection.value = { kind: "gone" };
@@ -109,7 +114,8 @@ function faultOf(files: NamedFile[]): string | null {
   if (files.length === 0) return strings.refused.noFiles;
   if (total === 0) return strings.refused.empty;
   if (limits && total > limits.body_bytes) return strings.refused.tooLarge(total, limits.body_bytes);
-  if (limits && files.length > limits.bundle_entries) return strings.refused.tooMany(files.length, limits.bundle_entries);
+  if (limits && files.length > limits.bundle_entries)
+    return strings.refused.tooMany(files.length, limits.bundle_entries);
   return null;
 }
 

@@ -46,7 +46,11 @@ function knot(vertices: string[], faces: string[]): void {
 /** A round plate with a rim and no bottom, so that the mesh has open edges to look at. */
 function plate(vertices: string[], faces: string[]): void {
   const [sides, first] = [48, vertices.length + 1];
-  for (const [radius, y] of [[1.1, 0.14], [1.2, 0.04], [1.2, -0.1]] as const) {
+  for (const [radius, y] of [
+    [1.1, 0.14],
+    [1.2, 0.04],
+    [1.2, -0.1],
+  ] as const) {
     for (let j = 0; j < sides; j++) {
       const a = (j / sides) * 2 * Math.PI;
       vertices.push(vertex([radius * Math.cos(a), y, radius * -Math.sin(a)], 0.9));

@@ -12,7 +12,14 @@ export function gestures(stage: HTMLElement): () => void {
   const on = { signal: off.signal };
   pointers(stage, on);
   stage.addEventListener("wheel", (event) => wheel(event), { ...on, passive: false });
-  stage.addEventListener("dblclick", () => { endStep(); fit(); }, on);
+  stage.addEventListener(
+    "dblclick",
+    () => {
+      endStep();
+      fit();
+    },
+    on,
+  );
   stage.addEventListener("keydown", (event) => keys(event), on);
   stage.addEventListener("contextmenu", (event) => event.shiftKey && event.preventDefault(), on);
   return () => off.abort();
@@ -25,24 +32,32 @@ interface Point {
 
 function pointers(stage: HTMLElement, on: AddEventListenerOptions): void {
   const down = new Map<number, Point>();
-  stage.addEventListener("pointerdown", (event) => {
-    if (event.button > 1) return;
-    stage.setPointerCapture(event.pointerId);
-    stage.focus({ preventScroll: true });
-    down.set(event.pointerId, { x: event.clientX, y: event.clientY });
-    if (down.size === 1) endStep();
-  }, on);
-  stage.addEventListener("pointermove", (event) => {
-    const before = down.get(event.pointerId);
-    if (!before) return;
-    const now = { x: event.clientX, y: event.clientY };
-    const others = [...down].filter(([id]) => id !== event.pointerId).map(([, point]) => point);
-    if (now.x === before.x && now.y === before.y) return;
-    hold(true);
-    down.set(event.pointerId, now);
-    if (others[0]) pinch(before, now, others[0], stage);
-    else drag(now.x - before.x, now.y - before.y, event.shiftKey || event.buttons === 4, stage);
-  }, on);
+  stage.addEventListener(
+    "pointerdown",
+    (event) => {
+      if (event.button > 1) return;
+      stage.setPointerCapture(event.pointerId);
+      stage.focus({ preventScroll: true });
+      down.set(event.pointerId, { x: event.clientX, y: event.clientY });
+      if (down.size === 1) endStep();
+    },
+    on,
+  );
+  stage.addEventListener(
+    "pointermove",
+    (event) => {
+      const before = down.get(event.pointerId);
+      if (!before) return;
+      const now = { x: event.clientX, y: event.clientY };
+      const others = [...down].filter(([id]) => id !== event.pointerId).map(([, point]) => point);
+      if (now.x === before.x && now.y === before.y) return;
+      hold(true);
+      down.set(event.pointerId, now);
+      if (others[0]) pinch(before, now, others[0], stage);
+      else drag(now.x - before.x, now.y - before.y, event.shiftKey || event.buttons === 4, stage);
+    },
+    on,
+  );
   const end = (event: PointerEvent) => {
     if (!down.delete(event.pointerId) || down.size > 0) return;
     hold(false);
@@ -76,15 +91,15 @@ function keys(event: KeyboardEvent): void {
   const step = event.shiftKey ? KEY_DEGREES * 3 : KEY_DEGREES;
   const actions: Record<string, () => void> = {
     // As a drag into the same direction.
-    ArrowLeft: () => turn(step, 0),
-    ArrowRight: () => turn(-step, 0),
-    ArrowUp: () => turn(0, -step),
-    ArrowDown: () => turn(0, step),
+    "ArrowLeft": () => turn(step, 0),
+    "ArrowRight": () => turn(-step, 0),
+    "ArrowUp": () => turn(0, -step),
+    "ArrowDown": () => turn(0, step),
     "+": () => void zoom(KEY_ZOOM),
     "=": () => void zoom(KEY_ZOOM),
     "-": () => void zoom(1 / KEY_ZOOM),
     "0": fit,
-    Home: fit,
+    "Home": fit,
   };
   const action = actions[event.key];
   if (!action) return;

@@ -29,8 +29,13 @@ function Grid({ offers, current, pick }: Props) {
         const url = thumbnails.value[offer.id];
         return (
           <li key={offer.id}>
-            <button type="button" aria-pressed={current === null ? undefined : offer.id === current} data-test={offer.id}
-              title={strings.looks.pick(offer.name)} onClick={() => pick(offer)}>
+            <button
+              type="button"
+              aria-pressed={current === null ? undefined : offer.id === current}
+              data-test={offer.id}
+              title={strings.looks.pick(offer.name)}
+              onClick={() => pick(offer)}
+            >
               <span class="thumbnail">{url && <img src={url} alt="" />}</span>
               <span class="thumbnail-name">{offer.name}</span>
             </button>

@@ -96,7 +96,15 @@ export class PictureLoop {
       }
       connection.value = { kind: "good" };
       const tookMs = performance.now() - began;
-      this.listener.shown({ picture: order.picture, draft: order.draft, path, url, bytes, headers: answer.headers, tookMs });
+      this.listener.shown({
+        picture: order.picture,
+        draft: order.draft,
+        path,
+        url,
+        bytes,
+        headers: answer.headers,
+        tookMs,
+      });
       return null;
     } catch (error) {
       return signal.aborted || isAbort(error) ? null : this.failed(error);

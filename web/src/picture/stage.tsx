@@ -1,17 +1,17 @@
 import { useEffect, useRef } from "preact/hooks";
-import { fit, isAtFault, showView, zoom } from "../camera/move";
+import { isAtFault } from "../camera/move";
 import { showKey, tab } from "../app/tab";
 import { CompareLayer, HeatText, SideNames } from "../compare/layer";
-import { CompareMenu } from "../compare/menu";
 import { compare } from "../compare/state";
 import { setKey } from "../state/edit";
 import { canUndo, endStep, look } from "../state/history";
-import { mesh, report } from "../state/mesh";
+import { report } from "../state/mesh";
 import { connection, pictureRefusal } from "../state/phase";
 import { room, shownSize } from "../state/size";
 import { strings } from "../strings";
 import { gestures } from "./gestures";
 import { busy, finished, shown } from "./live";
+import { Toolbar } from "./toolbar";
 
 /** The picture, with all that turns it. */
 export function Stage() {
@@ -23,8 +23,15 @@ export function Stage() {
     <section class="stage" aria-label={strings.picture.stage.split(".")[0]}>
       <Toolbar />
       <div class="frame" ref={frame}>
-        <div class="picture" ref={picture} tabIndex={0} role="application" aria-label={strings.picture.stage}
-          aria-busy={busy.value} data-test="stage">
+        <div
+          class="picture"
+          ref={picture}
+          tabIndex={0}
+          role="application"
+          aria-label={strings.picture.stage}
+          aria-busy={busy.value}
+          data-test="stage"
+        >
           <PictureImage />
           <CompareLayer />
         </div>
@@ -63,51 +70,45 @@ function PictureImage() {
   if (!current) return null;
   const style = String(current.picture.look.keys["style"] ?? "auto");
   const transparent = look.value.keys["image.background"] === "transparent";
-  return <img ref={box} class={`shot ${transparent ? "is-transparent" : ""}`} src={current.url} draggable={false}
-    alt={strings.picture.alt(current.picture.mesh.name, style)} data-test="picture" data-draft={current.draft}
-    data-path={current.path} data-finished={finished.value?.path} />;
+  return (
+    <img
+      ref={box}
+      class={`shot ${transparent ? "is-transparent" : ""}`}
+      src={current.url}
+      draggable={false}
+      alt={strings.picture.alt(current.picture.mesh.name, style)}
+      data-test="picture"
+      data-draft={current.draft}
+      data-path={current.path}
+      data-finished={finished.value?.path}
+    />
+  );
 }
 
 /** How the picture is turned, until it has been turned once. */
 function Hint() {
   const keys = look.value.keys;
-  if (canUndo.value || "camera.azimuth_deg" in keys || "camera.eye" in keys || compare.value || warningCodes().length > 0) return null;
+  if (
+    canUndo.value ||
+    "camera.azimuth_deg" in keys ||
+    "camera.eye" in keys ||
+    compare.value ||
+    warningCodes().length > 0
+  )
+    return null;
   const text = matchMedia("(hover: none)").matches ? strings.picture.touchHint : strings.picture.hint;
-  return <span class="hint" aria-hidden="true">{text}</span>;
-}
-
-const VIEWS = ["iso", "front", "back", "left", "right", "top", "bottom"] as const;
-const BACKGROUNDS = { white: "#fff", grey: "#f4f6f9..#c3cad4", dark: "#2a2f37..#14171c", transparent: "transparent" } as const;
-
-function Toolbar() {
-  const view = String(look.value.keys["camera.view"] ?? "");
-  const background = look.value.keys["image.background"] ?? "#fff";
   return (
-    <div class="toolbar" role="toolbar" aria-label={strings.picture.view}>
-      <div class="group">
-        <button type="button" onClick={() => { endStep(); fit(); }} data-test="fit" title={strings.picture.fit}>{strings.picture.fit}</button>
-        <button type="button" onClick={() => void zoom(1 / 1.25)} aria-label={strings.picture.zoomOut} title={strings.picture.zoomOut} data-test="zoom-out">−</button>
-        <button type="button" onClick={() => void zoom(1.25)} aria-label={strings.picture.zoomIn} title={strings.picture.zoomIn} data-test="zoom-in">+</button>
-      </div>
-      <div class="group views" role="group" aria-label={strings.picture.view}>
-        {VIEWS.map((name) => <button type="button" key={name} class="segment" aria-pressed={view === name} data-test={`view-${name}`}
-          onClick={() => { endStep(); showView(name); }}>{strings.picture.views[name]}</button>)}
-      </div>
-      <div class="group backgrounds" role="group" aria-label={strings.picture.background}>
-        {(Object.keys(BACKGROUNDS) as (keyof typeof BACKGROUNDS)[]).map((name) => (
-          <button type="button" key={name} class={`swatch bg-${name}`} aria-pressed={background === BACKGROUNDS[name]}
-            aria-label={strings.picture.backgrounds[name]} title={strings.picture.backgrounds[name]} data-test={`background-${name}`}
-            onClick={() => { endStep(); setKey("image.background", name === "white" ? undefined : BACKGROUNDS[name]); }} />
-        ))}
-      </div>
-      <span class="spring" />
-      {mesh.value && <CompareMenu />}
-    </div>
+    <span class="hint" aria-hidden="true">
+      {text}
+    </span>
   );
 }
 
 function warningCodes(): string[] {
-  return (finished.value?.headers.get("x-warnings") ?? "").split(",").map((code) => code.trim()).filter(Boolean);
+  return (finished.value?.headers.get("x-warnings") ?? "")
+    .split(",")
+    .map((code) => code.trim())
+    .filter(Boolean);
 }
 
 /** Warnings of the picture; those that the mesh's report has, too, in its words. */
@@ -116,8 +117,17 @@ function Warnings() {
   if (codes.length === 0 || pictureRefusal.value) return null;
   const stated = report.value?.warnings ?? [];
   const texts = codes.map((code) => stated.find((one) => one.code === code)?.detail ?? code.replaceAll("_", " "));
-  return <button type="button" class="warning-mark" title={texts.join("\n")} data-test="warnings"
-    onClick={() => (tab.value = "explain")}>{strings.picture.warning(texts.join("; "))}</button>;
+  return (
+    <button
+      type="button"
+      class="warning-mark"
+      title={texts.join("\n")}
+      data-test="warnings"
+      onClick={() => (tab.value = "explain")}
+    >
+      {strings.picture.warning(texts.join("; "))}
+    </button>
+  );
 }
 
 function Messages() {
@@ -128,11 +138,26 @@ function Messages() {
     <div class="message is-refusal" role="alert" data-test="picture-refusal">
       <strong>{strings.picture.refused}</strong>
       <span>{refusal.message}</span>
-      {key && <span class="group">
-        <button type="button" class="small" onClick={() => showKey(key)} data-test="show-key">{strings.picture.showKey(key)}</button>
-        {key in look.value.keys && <button type="button" class="small" data-test="reset-refused"
-          onClick={() => { endStep(); setKey(key, undefined); }}>{strings.controls.reset(key)}</button>}
-      </span>}
+      {key && (
+        <span class="group">
+          <button type="button" class="small" onClick={() => showKey(key)} data-test="show-key">
+            {strings.picture.showKey(key)}
+          </button>
+          {key in look.value.keys && (
+            <button
+              type="button"
+              class="small"
+              data-test="reset-refused"
+              onClick={() => {
+                endStep();
+                setKey(key, undefined);
+              }}
+            >
+              {strings.controls.reset(key)}
+            </button>
+          )}
+        </span>
+      )}
     </div>
   );
 }

@@ -38,7 +38,9 @@ export function presetOffers(): Offer[] {
 
 /** The look of a thumbnail: an offer from the direction of now, small, with the whole mesh in sight. */
 function small(own: Look): Look {
-  const view = Object.entries(look.peek().keys).filter(([key]) => isView(key) || key === "camera.up" || key === "scene.time_s");
+  const view = Object.entries(look.peek().keys).filter(
+    ([key]) => isView(key) || key === "camera.up" || key === "scene.time_s",
+  );
   const keys: Record<string, Value> = { ...own.keys, ...Object.fromEntries(view) };
   // A grid in place of an animation, which would draw the eye away from the picture.
   if (typeof keys["sheet.turntable"] === "number") Object.assign(keys, { "sheet.turntable": 4, "sheet.columns": 2 });

@@ -10,7 +10,8 @@ import { strings } from "../strings";
 
 type Check = Verdict["checks"][number];
 
-const STANDARD = "watertight,manifold,consistent-winding,no-degenerate,no-duplicate-faces,no-loose-vertices,no-inverted-volume";
+const STANDARD =
+  "watertight,manifold,consistent-winding,no-degenerate,no-duplicate-faces,no-loose-vertices,no-inverted-volume";
 const FAULTS_SHOWN = 20;
 
 const words = strings.report;
@@ -35,18 +36,32 @@ export function Checks() {
     const open = mesh.value;
     if (open && verdict.peek()?.of !== open) void check(open);
   });
-  return <><Verdicts /><Rules /></>;
+  return (
+    <>
+      <Verdicts />
+      <Rules />
+    </>
+  );
 }
 
 function Verdicts() {
   const found = verdict.value;
   if (!found || found.of !== mesh.value) return <p class="quiet">{words.checking}</p>;
-  if ("failed" in found) return <p class="refusal-text" role="alert">{found.failed}</p>;
+  if ("failed" in found)
+    return (
+      <p class="refusal-text" role="alert">
+        {found.failed}
+      </p>
+    );
   const anyPlaces = found.checks.some(({ where }) => where.length > 0);
   return (
     <>
       {anyPlaces && <p class="quiet">{words.faults}</p>}
-      <ul class="checks">{found.checks.map((one) => <CheckItem key={one.rule} check={one} />)}</ul>
+      <ul class="checks">
+        {found.checks.map((one) => (
+          <CheckItem key={one.rule} check={one} />
+        ))}
+      </ul>
     </>
   );
 }
@@ -62,8 +77,14 @@ function Rules() {
   return (
     <details class="rules">
       <summary>{words.rules}</summary>
-      <textarea rows={3} aria-label={words.rules} spellcheck={false} value={rules.value.replaceAll(",", ", ")}
-        onChange={(e) => change(e.currentTarget.value)} data-test="rules" />
+      <textarea
+        rows={3}
+        aria-label={words.rules}
+        spellcheck={false}
+        value={rules.value.replaceAll(",", ", ")}
+        onChange={(e) => change(e.currentTarget.value)}
+        data-test="rules"
+      />
       <p class="quiet">{words.knownRules(known)}</p>
     </details>
   );
@@ -76,10 +97,14 @@ function CheckItem({ check: { rule, ok, level, detail, where, found } }: { check
     <li class={`check is-${state}`} data-test={`check-${rule}`}>
       <span class="verdict">{words[state]}</span> <strong>{rule}</strong>
       {!ok && <p>{detail}</p>}
-      {where.length > 0 && <div class="faults">
-        {where.slice(0, FAULTS_SHOWN).map((place, i) => <Fault key={i} id={`${rule}-${i}`} number={i + 1} place={place} />)}
-        {rest > 0 && <span class="quiet">{words.moreFaults(rest)}</span>}
-      </div>}
+      {where.length > 0 && (
+        <div class="faults">
+          {where.slice(0, FAULTS_SHOWN).map((place, i) => (
+            <Fault key={i} id={`${rule}-${i}`} number={i + 1} place={place} />
+          ))}
+          {rest > 0 && <span class="quiet">{words.moreFaults(rest)}</span>}
+        </div>
+      )}
     </li>
   );
 }
@@ -91,8 +116,19 @@ function Fault({ id, number, place }: { id: string; number: number; place: objec
     current.value = id;
     flyTo(points);
   };
-  return <button type="button" class="fault" aria-pressed={current.value === id} data-test={`fault-${id}`}
-    title={points.map((p) => `(${p.join(", ")})`).join(" ")} aria-label={`${words.fault(number)}: ${kind}`} onClick={fly}>{number}</button>;
+  return (
+    <button
+      type="button"
+      class="fault"
+      aria-pressed={current.value === id}
+      data-test={`fault-${id}`}
+      title={points.map((p) => `(${p.join(", ")})`).join(" ")}
+      aria-label={`${words.fault(number)}: ${kind}`}
+      onClick={fly}
+    >
+      {number}
+    </button>
+  );
 }
 
 function pointsOf(place: object): [string, Vec[]] {

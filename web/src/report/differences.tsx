@@ -49,7 +49,9 @@ function DistancePicture({ both }: { both: { a: string; b: string } }) {
   return (
     <>
       {state && <p class="quiet">{state.failed}</p>}
-      <button type="button" class="small" onClick={() => void draw(both)} data-test="distance-picture">{words.heatPicture}</button>
+      <button type="button" class="small" onClick={() => void draw(both)} data-test="distance-picture">
+        {words.heatPicture}
+      </button>
     </>
   );
 }
@@ -81,7 +83,11 @@ function Summary({ difference: { same, summary, geometry } }: { difference: Diff
   const distance = (n: number | null) => (n === null ? "–" : String(Number(n.toPrecision(4))));
   return (
     <>
-      <ul ref={list} class="warnings">{summary.map((line) => <li key={line}>{line}</li>)}</ul>
+      <ul ref={list} class="warnings">
+        {summary.map((line) => (
+          <li key={line}>{line}</li>
+        ))}
+      </ul>
       {!geometry.same && <p class="quiet">{words.distance(distance(geometry.hausdorff), distance(geometry.mean))}</p>}
     </>
   );

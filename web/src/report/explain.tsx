@@ -18,7 +18,11 @@ interface Stage {
 export function stagesOf(header: string | null): Stage[] {
   return (header ?? "").split(",").flatMap((part) => {
     const [name, ...parameters] = part.trim().split(";");
-    const get = (key: string) => parameters.find((p) => p.trim().startsWith(`${key}=`))?.trim().slice(key.length + 1);
+    const get = (key: string) =>
+      parameters
+        .find((p) => p.trim().startsWith(`${key}=`))
+        ?.trim()
+        .slice(key.length + 1);
     const ms = Number(get("dur"));
     return name && Number.isFinite(ms) ? [{ name, ms, note: (get("desc") ?? "").replaceAll('"', "") }] : [];
   });
@@ -41,9 +45,18 @@ export function ExplainPanel() {
   return (
     <div class="explain" data-test="explain">
       <dl>
-        <Row name={words.size}>{width} × {height}, {bytes(current.bytes.size)}</Row>
+        <Row name={words.size}>
+          {width} × {height}, {bytes(current.bytes.size)}
+        </Row>
         <Row name={words.total}>{words.ms(current.tookMs)}</Row>
-        {rows.map(([name, value]) => value && <Row name={name} key={name}>{value}</Row>)}
+        {rows.map(
+          ([name, value]) =>
+            value && (
+              <Row name={name} key={name}>
+                {value}
+              </Row>
+            ),
+        )}
       </dl>
       <Stages shown={current} />
       <p class="quiet">{words.skips}</p>
@@ -64,7 +77,11 @@ function Stages({ shown }: { shown: Shown }) {
   return (
     <>
       <h2>{words.stages}</h2>
-      <ul class="stages">{stages.map((stage) => <StageBar key={stage.name} stage={stage} share={stage.ms / most} />)}</ul>
+      <ul class="stages">
+        {stages.map((stage) => (
+          <StageBar key={stage.name} stage={stage} share={stage.ms / most} />
+        ))}
+      </ul>
     </>
   );
 }
@@ -76,8 +93,13 @@ function StageBar({ stage, share }: { stage: Stage; share: number }) {
   });
   return (
     <li>
-      <span class="stage-name">{stage.name}{stage.note && <small> {stage.note}</small>}</span>
-      <span class="stage-bar"><span ref={bar} /></span>
+      <span class="stage-name">
+        {stage.name}
+        {stage.note && <small> {stage.note}</small>}
+      </span>
+      <span class="stage-bar">
+        <span ref={bar} />
+      </span>
       <span class="stage-ms">{words.ms(stage.ms)}</span>
     </li>
   );

@@ -21,7 +21,11 @@ export function ReportPanel() {
       <h2>{words.mesh}</h2>
       <dl>
         <Row name={words.format}>{found.format}</Row>
-        {found.generator && <Row name={words.generator}><bdi>{found.generator}</bdi></Row>}
+        {found.generator && (
+          <Row name={words.generator}>
+            <bdi>{found.generator}</bdi>
+          </Row>
+        )}
         <Row name={words.file}>{bytes(found.file_bytes)}</Row>
         <Row name={words.triangles}>{count(found.triangles)}</Row>
         <Row name={words.polygons}>{count(found.polygons)}</Row>
@@ -33,18 +37,33 @@ export function ReportPanel() {
         {found.area !== null && <Row name={words.area}>{figure(found.area)}</Row>}
         {found.volume !== null && <Row name={words.volume}>{figure(found.volume)}</Row>}
       </dl>
-      {topology && <>
-        <h2>{words.topology} <button type="button" class="small" onClick={() => setStyle("topology")} data-test="show-topology">{words.showEdges}</button></h2>
-        <dl>
-          <Row name={words.watertight}>{topology.is_watertight ? words.yes : words.no}</Row>
-          <Row name={words.components}>{count(topology.components)}</Row>
-          <Row name={words.openEdges} bad={topology.open_edges > 0}>{count(topology.open_edges)}</Row>
-          <Row name={words.loops}>{count(topology.boundary_loops)}</Row>
-          <Row name={words.nonmanifold} bad={topology.nonmanifold_edges > 0}>{count(topology.nonmanifold_edges)}</Row>
-          <Row name={words.inconsistent} bad={topology.inconsistent_edges > 0}>{count(topology.inconsistent_edges)}</Row>
-          <Row name={words.duplicates} bad={topology.duplicate_faces > 0}>{count(topology.duplicate_faces)}</Row>
-        </dl>
-      </>}
+      {topology && (
+        <>
+          <h2>
+            {words.topology}{" "}
+            <button type="button" class="small" onClick={() => setStyle("topology")} data-test="show-topology">
+              {words.showEdges}
+            </button>
+          </h2>
+          <dl>
+            <Row name={words.watertight}>{topology.is_watertight ? words.yes : words.no}</Row>
+            <Row name={words.components}>{count(topology.components)}</Row>
+            <Row name={words.openEdges} bad={topology.open_edges > 0}>
+              {count(topology.open_edges)}
+            </Row>
+            <Row name={words.loops}>{count(topology.boundary_loops)}</Row>
+            <Row name={words.nonmanifold} bad={topology.nonmanifold_edges > 0}>
+              {count(topology.nonmanifold_edges)}
+            </Row>
+            <Row name={words.inconsistent} bad={topology.inconsistent_edges > 0}>
+              {count(topology.inconsistent_edges)}
+            </Row>
+            <Row name={words.duplicates} bad={topology.duplicate_faces > 0}>
+              {count(topology.duplicate_faces)}
+            </Row>
+          </dl>
+        </>
+      )}
       <Warnings warnings={found.warnings} />
     </div>
   );
@@ -56,7 +75,9 @@ function Warnings({ warnings }: { warnings: unknown[] }) {
     <>
       <h2>{words.warnings}</h2>
       <ul class="warnings">
-        {warnings.map((warning, i) => <li key={i}>{textOfWarning(warning)}</li>)}
+        {warnings.map((warning, i) => (
+          <li key={i}>{textOfWarning(warning)}</li>
+        ))}
       </ul>
     </>
   );
@@ -69,5 +90,10 @@ function textOfWarning(warning: unknown): string {
 }
 
 export function Row({ name, bad = false, children }: { name: string; bad?: boolean; children: ComponentChildren }) {
-  return <div class={bad ? "is-bad" : ""}><dt>{name}</dt><dd>{children}</dd></div>;
+  return (
+    <div class={bad ? "is-bad" : ""}>
+      <dt>{name}</dt>
+      <dd>{children}</dd>
+    </div>
+  );
 }

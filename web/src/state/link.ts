@@ -22,13 +22,17 @@ const OWN = new Set(["mesh", "name", "entry", "format_in", "size", "as", "beside
 export function fragment(): string {
   const open = mesh.value;
   if (!open) return "";
-  const pairs: [string, string][] = [["mesh", open.sha256], ["name", open.name]];
+  const pairs: [string, string][] = [
+    ["mesh", open.sha256],
+    ["name", open.name],
+  ];
   if (open.entry !== null) pairs.push(["entry", open.entry]);
   if (open.formatIn !== null) pairs.push(["format_in", open.formatIn]);
   pairs.push(...allPairsOf(look.value));
   if (chosenSize.value) pairs.push(["size", sizeText(chosenSize.value)]);
   if (format.value !== "webp") pairs.push(["as", format.value]);
-  if (compare.value) pairs.push(["beside", JSON.stringify({ ...compare.value, mesh: withoutFiles(compare.value.mesh) })]);
+  if (compare.value)
+    pairs.push(["beside", JSON.stringify({ ...compare.value, mesh: withoutFiles(compare.value.mesh) })]);
   return `#${queryOf(pairs)}`;
 }
 
@@ -83,7 +87,8 @@ export function lookOf(pairs: [string, string][]): Look {
 }
 
 function valueOf(text: string): Value {
-  if (/^-?(0|[1-9]\d*)(\.\d+)?(e[-+]?\d+)?$/i.test(text) || /^(true|false|null)$/.test(text)) return JSON.parse(text) as Value;
+  if (/^-?(0|[1-9]\d*)(\.\d+)?(e[-+]?\d+)?$/i.test(text) || /^(true|false|null)$/.test(text))
+    return JSON.parse(text) as Value;
   if (/^[[{]/.test(text)) {
     try {
       return JSON.parse(text) as Value;

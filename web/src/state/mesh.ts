@@ -28,5 +28,10 @@ export function readingPairs(of: OpenMesh): [string, string][] {
 /** Name of a mesh without its folders and extension, for files that are made of it. */
 export function stem(of: OpenMesh): string {
   const file = of.name.split(/[\\/]/).at(-1) ?? of.name;
-  return file.replace(/\.[a-z0-9]{1,5}$/i, "").replace(/[^\p{L}\p{N}._ -]/gu, "_").trim() || "mesh";
+  return (
+    file
+      .replace(/\.[a-z0-9]{1,5}$/i, "")
+      .replace(/[^\p{L}\p{N}._ -]/gu, "_")
+      .trim() || "mesh"
+  );
 }

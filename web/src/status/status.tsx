@@ -12,14 +12,22 @@ export function Status() {
   return (
     <>
       <header class="top">
-        <h1 class="brand">{strings.name} · {words.title}</h1>
+        <h1 class="brand">
+          {strings.name} · {words.title}
+        </h1>
         <span class="spring" />
-        <span class="quiet" data-test="updated">{updated.value && words.updated(updated.value.toLocaleTimeString())}</span>
+        <span class="quiet" data-test="updated">
+          {updated.value && words.updated(updated.value.toLocaleTimeString())}
+        </span>
         <a href={address("metrics")}>{words.metrics}</a>
         <a href={address("")}>{words.page}</a>
       </header>
       <main>
-        {trouble.value && <p class="trouble" role="alert" data-test="trouble">{trouble.value}</p>}
+        {trouble.value && (
+          <p class="trouble" role="alert" data-test="trouble">
+            {trouble.value}
+          </p>
+        )}
         {needsKey.value && <KeyForm />}
         {found && !needsKey.value && <Tables found={found} />}
       </main>
@@ -36,8 +44,12 @@ function KeyForm() {
   };
   return (
     <form class="key" onSubmit={use} data-test="key-form">
-      <label>{strings.key.label} <input ref={input} type="password" autocomplete="off" data-test="key" /></label>
-      <button type="submit" class="primary" data-test="key-use">{strings.key.save}</button>
+      <label>
+        {strings.key.label} <input ref={input} type="password" autocomplete="off" data-test="key" />
+      </label>
+      <button type="submit" class="primary" data-test="key-use">
+        {strings.key.save}
+      </button>
     </form>
   );
 }
@@ -47,14 +59,40 @@ function Tables({ found }: { found: ServerStatus }) {
     <>
       <Tiles found={found} />
       <div class="tables">
-        <Table name="queue" title={words.queue} columns={words.queueColumns} rows={(found.queue ?? []).map((one) =>
-          [one.class, number(one.queued), number(one.running), time(one.oldest_ms), time(one.wait_ms)])} />
+        <Table
+          name="queue"
+          title={words.queue}
+          columns={words.queueColumns}
+          rows={(found.queue ?? []).map((one) => [
+            one.class,
+            number(one.queued),
+            number(one.running),
+            time(one.oldest_ms),
+            time(one.wait_ms),
+          ])}
+        />
         <Memory found={found} />
         <Pictures found={found} />
         <Table name="kept" title={words.kept} columns={words.keptColumns} rows={entries(found.kept)} />
-        <Table name="caches" title={words.caches} columns={words.cacheColumns} rows={(found.caches ?? []).map((one) =>
-          [one.name, number(one.entries), size(one.bytes), size(one.limit_bytes), number(one.hits), number(one.misses)])} />
-        <Table name="shared-queue" title={words.shared} columns={words.sharedColumns} rows={entries(found.shared_queue?.messages)} />
+        <Table
+          name="caches"
+          title={words.caches}
+          columns={words.cacheColumns}
+          rows={(found.caches ?? []).map((one) => [
+            one.name,
+            number(one.entries),
+            size(one.bytes),
+            size(one.limit_bytes),
+            number(one.hits),
+            number(one.misses),
+          ])}
+        />
+        <Table
+          name="shared-queue"
+          title={words.shared}
+          columns={words.sharedColumns}
+          rows={entries(found.shared_queue?.messages)}
+        />
       </div>
       <Failures found={found} />
     </>
@@ -79,7 +117,15 @@ function Tiles({ found }: { found: ServerStatus }) {
   ];
   return (
     <dl class="tiles" data-test="tiles">
-      {tiles.map(([name, value, help]) => value !== null && <div key={name} title={help}><dt>{name}</dt><dd>{value}</dd></div>)}
+      {tiles.map(
+        ([name, value, help]) =>
+          value !== null && (
+            <div key={name} title={help}>
+              <dt>{name}</dt>
+              <dd>{value}</dd>
+            </div>
+          ),
+      )}
     </dl>
   );
 }
@@ -109,10 +155,23 @@ function Pictures({ found }: { found: ServerStatus }) {
 
 function Failures({ found }: { found: ServerStatus }) {
   const rows = (found.failures ?? []).map((one) => [
-    moment(one.last_at ?? one.at), one.place ?? null, one.status ?? null, one.code ?? null, one.detail ?? null, number(one.count),
+    moment(one.last_at ?? one.at),
+    one.place ?? null,
+    one.status ?? null,
+    one.code ?? null,
+    one.detail ?? null,
+    number(one.count),
   ]);
-  if (rows.length > 0) return <Table name="failures" title={words.failures} columns={words.failureColumns} rows={rows} text={[0, 1, 3, 4]} />;
-  return <section><h2>{words.failures}</h2><p class="quiet">{words.noFailures}</p></section>;
+  if (rows.length > 0)
+    return (
+      <Table name="failures" title={words.failures} columns={words.failureColumns} rows={rows} text={[0, 1, 3, 4]} />
+    );
+  return (
+    <section>
+      <h2>{words.failures}</h2>
+      <p class="quiet">{words.noFailures}</p>
+    </section>
+  );
 }
 
 const number = (n: number | undefined): string | null => (n === undefined ? null : count(n));
@@ -132,7 +191,17 @@ function moment(text: string | undefined): string | null {
 
 function duration(seconds: number): string {
   const s = Math.floor(seconds);
-  const parts: [number, string][] = [[Math.floor(s / 86400), "d"], [Math.floor(s / 3600) % 24, "h"], [Math.floor(s / 60) % 60, "min"], [s % 60, "s"]];
+  const parts: [number, string][] = [
+    [Math.floor(s / 86400), "d"],
+    [Math.floor(s / 3600) % 24, "h"],
+    [Math.floor(s / 60) % 60, "min"],
+    [s % 60, "s"],
+  ];
   const from = parts.findIndex(([n]) => n > 0);
-  return from < 0 ? "0 s" : parts.slice(from, from + 2).map(([n, unit]) => `${n} ${unit}`).join(" ");
+  return from < 0
+    ? "0 s"
+    : parts
+        .slice(from, from + 2)
+        .map(([n, unit]) => `${n} ${unit}`)
+        .join(" ");
 }

@@ -20,8 +20,26 @@ export function Table({ name, title, columns, rows, text = [0] }: Props) {
       <h2 id={`${name}-title`}>{title}</h2>
       <div class="scroller" tabIndex={0} role="region" aria-labelledby={`${name}-title`}>
         <table data-test={name} aria-labelledby={`${name}-title`}>
-          <thead><tr>{used.map((i) => <th key={i} scope="col" class={kind(i)}>{columns[i]}</th>)}</tr></thead>
-          <tbody>{rows.map((row, r) => <tr key={r}>{used.map((i) => <td key={i} class={kind(i)}>{row[i]}</td>)}</tr>)}</tbody>
+          <thead>
+            <tr>
+              {used.map((i) => (
+                <th key={i} scope="col" class={kind(i)}>
+                  {columns[i]}
+                </th>
+              ))}
+            </tr>
+          </thead>
+          <tbody>
+            {rows.map((row, r) => (
+              <tr key={r}>
+                {used.map((i) => (
+                  <td key={i} class={kind(i)}>
+                    {row[i]}
+                  </td>
+                ))}
+              </tr>
+            ))}
+          </tbody>
         </table>
       </div>
     </section>
@@ -37,7 +55,9 @@ export function Share({ of, all }: { of: number; all: number }) {
   });
   return (
     <span class={share > 0.9 ? "share is-high" : "share"}>
-      <span class="share-bar"><span ref={bar} /></span>
+      <span class="share-bar">
+        <span ref={bar} />
+      </span>
       <span class="share-text">{(share * 100).toFixed(share < 0.1 ? 1 : 0)} %</span>
     </span>
   );
