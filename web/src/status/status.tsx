@@ -144,7 +144,12 @@ function Memory({ found }: { found: ServerStatus }) {
 }
 
 function accountRow({ account, used_bytes: used, limit_bytes: limit }: Account) {
-  return [account, size(used), limit ? bytes(limit) : null, limit ? <Share of={used ?? 0} all={limit} /> : null];
+  return [
+    account,
+    size(used),
+    limit ? bytes(limit) : null,
+    limit ? <Share of={used ?? 0} all={limit} isLimit /> : null,
+  ];
 }
 
 function Pictures({ found }: { found: ServerStatus }) {

@@ -46,15 +46,15 @@ export function Table({ name, title, columns, rows, text = [0] }: Props) {
   );
 }
 
-/** A share as a bar with its figure. */
-export function Share({ of, all }: { of: number; all: number }) {
+/** A share as a bar with its figure. Near a limit it is red. */
+export function Share({ of, all, isLimit }: { of: number; all: number; isLimit?: boolean }) {
   const bar = useRef<HTMLSpanElement>(null);
   const share = all > 0 ? Math.min(1, of / all) : 0;
   useEffect(() => {
     if (bar.current) bar.current.style.width = `${share * 100}%`;
   });
   return (
-    <span class={share > 0.9 ? "share is-high" : "share"}>
+    <span class={isLimit && share > 0.9 ? "share is-high" : "share"}>
       <span class="share-bar">
         <span ref={bar} />
       </span>
