@@ -60,7 +60,7 @@ export function keyFlags(scopesOf) {
 
 /** A page in a context of its own, or in that of `beside`. Faults of the page are collected in `page.faults`. */
 export async function newPage({ beside, ...options } = {}) {
-  const viewport = { width: 1100, height: 760 };
+  const viewport = { width: 1000, height: 640 };
   const context = beside?.context() ?? (await browser.newContext({ viewport, reducedMotion: "reduce", ...options }));
   context.setDefaultTimeout(PATIENCE_MS);
   const page = await context.newPage();
@@ -72,7 +72,7 @@ export async function newPage({ beside, ...options } = {}) {
 
 /** Waits until a condition in the page holds. */
 export function until(page, condition, argument) {
-  return page.waitForFunction(condition, argument, { timeout: PATIENCE_MS, polling: 50 });
+  return page.waitForFunction(condition, argument, { timeout: PATIENCE_MS, polling: 20 });
 }
 
 /** A file as the inputs of the page take it. */
