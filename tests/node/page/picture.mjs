@@ -101,6 +101,8 @@ await run({
     const one = await opened();
     await one.click(bySelector("style-wire"));
     const first = await checkedAddress(one);
+    // The address bar follows once the look rests.
+    await until(one, () => location.hash.includes("style=wire"));
     const two = await newPage({ beside: one });
     await two.goto(one.url());
     assert.equal(await checkedAddress(two), first);

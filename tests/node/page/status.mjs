@@ -47,5 +47,10 @@ await run({
     await enter(other, "viewer");
     assert.match(await other.textContent(bySelector("trouble")), /admin/);
     assert.equal(await other.locator(bySelector("tiles")).count(), 0);
+    // Another key may be given at once.
+    await other.fill(bySelector("key"), "boss");
+    await other.click(bySelector("key-use"));
+    await other.waitForSelector(bySelector("tiles"));
+    await other.waitForSelector(bySelector("trouble"), { state: "detached" });
   },
 });

@@ -59,6 +59,7 @@ await run({
     await choose(page, file("cube.obj", CUBE));
     await checkedAddress(page, "right");
     // The key is kept for the tab, and nowhere where another tab finds it.
+    await until(page, () => location.hash.includes("mesh="));
     await page.reload();
     await checkedAddress(page, "right");
     const other = await newPage({ beside: page });
@@ -72,8 +73,9 @@ await run({
     const page = await newPage();
     const sent = [];
     page.on("request", (request) => request.method() === "POST" && sent.push(request.url()));
-    await Promise.all([page.waitForResponse((one) => one.url().endsWith("/v1/capabilities")), page.goto(url)]);
-    await until(page, () => document.body.textContent.includes("OBJ"));
+    await page.goto(url);
+    // What the page knows of formats and limits has come.
+    await until(page, () => /3MF/i.test(document.querySelector('[data-test="empty"]')?.textContent));
     await choose(page, file("large.obj", CUBE.repeat(10)));
     await isShown(page, "refusal");
     assert.deepEqual(sent, []);

@@ -1,5 +1,6 @@
 import { signal } from "@preact/signals";
 import { json, Refusal, Unreachable } from "../api/client";
+import { needsKey } from "../api/key";
 import { strings } from "../strings";
 
 type Counts = Record<string, number>;
@@ -61,6 +62,8 @@ export async function poll(): Promise<void> {
     trouble.value = describe(error);
     // Neither a key that is missing nor one that lacks the scope comes by itself.
     again = !(error instanceof Refusal && (error.status === 401 || error.status === 403));
+    // Another key may have it.
+    if (error instanceof Refusal && error.status === 403) needsKey.value = true;
   }
   clearTimeout(timer);
   if (again) timer = setTimeout(() => void poll(), PERIOD_MS);
