@@ -101,7 +101,8 @@ fn the_front_page_says_what_this_is() {
     assert_eq!((page.status, page.header("content-type")), (200, Some("text/plain; charset=utf-8")));
     let text = String::from_utf8(page.body).unwrap();
     assert!(text.contains("curl --data-binary @model.obj 'http://localhost/v1/render?style=wire'"), "{text}");
-    let paths: Vec<&str> = text.lines().filter(|line| line.starts_with("  /")).flat_map(str::split_whitespace).collect();
+    let paths: Vec<&str> =
+        text.lines().filter(|line| line.starts_with("  /")).flat_map(str::split_whitespace).collect();
     let paths: Vec<&str> = paths.into_iter().filter(|word| word.starts_with('/')).collect();
     assert_eq!(paths.len(), 9, "{paths:?}");
     for path in paths {

@@ -124,7 +124,12 @@ fn the_status_agrees_with_the_metrics() {
     let failures = status["failures"].as_array().unwrap().iter();
     let failures: Vec<_> = failures
         .map(|f| {
-            (f["place"].as_str().unwrap(), f["status"].as_u64(), f["code"].as_str().unwrap(), f["count"].as_u64().unwrap())
+            (
+                f["place"].as_str().unwrap(),
+                f["status"].as_u64(),
+                f["code"].as_str().unwrap(),
+                f["count"].as_u64().unwrap(),
+            )
         })
         .collect();
     let want = [

@@ -104,11 +104,7 @@ impl MemoryDto {
         let accounts = gauges.memory.iter();
         let accounts =
             accounts.map(|&(account, used_bytes, limit_bytes)| AccountDto { account, used_bytes, limit_bytes });
-        Self {
-            limit_bytes: gauges.memory_budget,
-            resident_bytes: gauges.resident_bytes,
-            accounts: accounts.collect(),
-        }
+        Self { limit_bytes: gauges.memory_budget, resident_bytes: gauges.resident_bytes, accounts: accounts.collect() }
     }
 }
 

@@ -84,7 +84,10 @@ impl Page {
 /// The source of the policy for the element of a page between a tag and its end: the hash of its text.
 fn hash_of(html: &str, (tag, end): (&str, &str)) -> String {
     let text = html.split_once(tag).and_then(|(_, rest)| rest.split_once(end));
-    text.map_or_else(|| "'none'".to_owned(), |(text, _)| format!("'sha256-{}'", STANDARD.encode(Digest::of(text.as_bytes()).as_bytes())))
+    text.map_or_else(
+        || "'none'".to_owned(),
+        |(text, _)| format!("'sha256-{}'", STANDARD.encode(Digest::of(text.as_bytes()).as_bytes())),
+    )
 }
 
 /// True for a browser that opens a page.

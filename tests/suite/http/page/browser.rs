@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::{Mutex, PoisonError};
 
 use crate::support::server::meshsnap;
 use crate::support::skip::{Need, skip};
@@ -24,10 +25,14 @@ pub fn browser_and(module: &str) -> Option<(PathBuf, PathBuf)> {
     Some((browser, modules))
 }
 
+/// Held while a browser runs: several at a time would take the processor from tests that have a deadline.
+static BROWSER: Mutex<()> = Mutex::new(());
+
 /// Runs a script of `tests/node/page`, all of whose cases must pass.
 #[track_caller]
 fn passes(script: &str, cases: usize) {
     let Some((browser, modules)) = browser_and("playwright-core") else { return };
+    let _one = BROWSER.lock().unwrap_or_else(PoisonError::into_inner);
     let mut command = Command::new("node");
     command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/node/page").join(script));
     command.env("MESHSNAP_TEST_PROGRAM", meshsnap().get_program()).env("MESHSNAP_TEST_BROWSER", browser);
@@ -67,6 +72,11 @@ fn operators_see_jobs_and_failures() {
 #[test]
 fn the_pages_work_below_a_path() {
     passes("prefix.mjs", 1);
+}
+
+#[test]
+fn the_page_looks_as_it_was_looked_at() {
+    passes("pictures.mjs", 3);
 }
 
 #[test]
