@@ -164,6 +164,8 @@ export const strings = {
     copied: "Copied",
     failed: "Copying failed: select the text instead",
     share: "Share",
+    shared: "Link copied",
+    shareFailed: "Copying failed",
     shareHelp: "Copies a link to this page with the mesh, the view and all settings",
     download: "Download",
     size: "Size",

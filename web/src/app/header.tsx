@@ -1,6 +1,6 @@
 import { useRef } from "preact/hooks";
 import { apiKey, forgetKey } from "../api/key";
-import { copyText } from "../copy/copy";
+import { copied, copyText } from "../copy/copy";
 import { filesOfInput } from "../files/drop";
 import { openFiles } from "../files/open";
 import { shareLink } from "../state/link";
@@ -47,7 +47,11 @@ export function Header() {
             title={strings.copy.shareHelp}
             data-test="share"
           >
-            {strings.copy.share}
+            {copied.value === "share"
+              ? strings.copy.shared
+              : copied.value === "share-failed"
+                ? strings.copy.shareFailed
+                : strings.copy.share}
           </button>
           <button type="button" onClick={() => input.current?.click()} data-test="open">
             {strings.open.another}

@@ -10,7 +10,10 @@ import { documentAddress, KINDS, type LineKind, lineOf } from "./lines";
 import { signedAndTried } from "./sign";
 
 const kind = signal<LineKind>("url");
-const copied = signal<string | null>(null);
+/** What was copied last, for a moment. */
+export const copied = signal<string | null>(null);
+const SAID_MS = 3000;
+let timer: ReturnType<typeof setTimeout> | undefined;
 const custom = signal(false);
 
 /** The signed address of the finished picture, where the page's key makes one. */
@@ -34,12 +37,13 @@ export async function copyText(text: string, what: string): Promise<void> {
   try {
     await navigator.clipboard.writeText(text);
     copied.value = what;
-    announcement.value = strings.copy.copied;
+    announcement.value = what === "share" ? strings.copy.shared : strings.copy.copied;
   } catch {
     copied.value = `${what}-failed`;
     announcement.value = strings.copy.failed;
   }
-  setTimeout(() => (copied.value = null), 2000);
+  clearTimeout(timer);
+  timer = setTimeout(() => (copied.value = null), SAID_MS);
 }
 
 export function CopyPanel() {
