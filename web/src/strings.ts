@@ -107,6 +107,13 @@ export const strings = {
       top: "top",
       bottom: "bottom",
     },
+    legend: "Colours of the edges",
+    topology: {
+      open: "open: one face",
+      nonmanifold: "more than two faces, or faces that disagree",
+      crease: "crease",
+      polygon: "other edges",
+    },
     background: "Background",
     backgrounds: { white: "White", grey: "Grey gradient", dark: "Dark", transparent: "Transparent" },
   },

@@ -40,7 +40,17 @@ export const PRESETS: { name: string; look: Look }[] = [
     name: "night wire",
     look: of({ "style": "wire", "surface.color": "#20242c", "wire.color": "#6ee7d8", "image.background": "#14171c" }),
   },
-  { name: "open edges", look: of({ "style": "topology", "topology.thickness": 1.5, "topology.crease": "#1f6feb" }) },
+  {
+    name: "open edges",
+    look: of({
+      "style": "clay",
+      "surface.color": "#dfe3e8",
+      "wire.edges": "boundary",
+      "wire.color": "#f05a1e",
+      "wire.thickness": 3,
+      "wire.hidden": "fade",
+    }),
+  },
   { name: "normals", look: of({ "surface.debug": "normal" }) },
   { name: "curvature", look: of({ "surface.debug": "curvature", "image.legend": true }) },
   { name: "orientation", look: of({ "surface.debug": "face-orientation" }) },

@@ -11,6 +11,7 @@ import { room, shownSize } from "../state/size";
 import { strings } from "../strings";
 import { gestures } from "./gestures";
 import { busy, finished, shown } from "./live";
+import { Legend } from "./legend";
 import { Toolbar } from "./toolbar";
 
 /** The picture, with all that turns it. */
@@ -36,6 +37,7 @@ export function Stage() {
           <CompareLayer />
         </div>
         <Hint />
+        <Legend />
         <SideNames />
         <HeatText />
         {isAtFault() && <span class="fault-mark" aria-hidden="true" data-test="fault-mark" />}
