@@ -205,6 +205,7 @@ export const strings = {
     },
     jsonNote: (url: string) => `The request document, for a POST to ${url} as application/json.`,
     keyedNote: "This server asks for keys. Where none can be sent, take the signed URL.",
+    openNote: "This server asks for no key, so the plain address works for everyone who reaches it.",
     signedNote: "Shows this picture to everyone, without a key, for a day.",
     keyNote: "MESHSNAP_KEY stands for your key.",
   },

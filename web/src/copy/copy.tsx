@@ -7,7 +7,7 @@ import { announcement } from "../state/phase";
 import { chosenSize, extension, type Format, format, pictureSize, readSize, sizeText } from "../state/size";
 import { strings } from "../strings";
 import { documentAddress, KINDS, type LineKind, lineOf } from "./lines";
-import { signedAndTried } from "./sign";
+import { signedAndTried, worksWithoutKey } from "./sign";
 
 const kind = signal<LineKind>("url");
 /** What was copied last, for a moment. */
@@ -19,6 +19,9 @@ const custom = signal(false);
 /** The signed address of the finished picture, where the page's key makes one. */
 const signedAddress = signal<string | null>(null);
 
+/** True once the server has shown a picture without the key that the page has. */
+const keyIsNotNeeded = signal(false);
+
 function signWhenAsked(): void {
   signedAddress.value = null;
   const key = apiKey.value;
@@ -26,8 +29,13 @@ function signWhenAsked(): void {
   if (kind.value !== "signed" || !key || !picture) return;
   const url = pictureAddress(picture);
   const isNewest = () => finished.peek()?.picture === picture && kind.peek() === "signed";
-  signedAndTried(url, key)
-    .then((made) => isNewest() && (signedAddress.value = made))
+  worksWithoutKey(url)
+    .then(async (works) => {
+      const made = works ? null : await signedAndTried(url, key);
+      if (!isNewest()) return;
+      keyIsNotNeeded.value = works;
+      signedAddress.value = made;
+    })
     .catch(() => undefined);
 }
 
@@ -53,7 +61,8 @@ export function CopyPanel() {
   const limit = capabilities.value?.limits?.image_px ?? 4096;
   const keyed = apiKey.value !== null;
   const signedText = kind.value === "signed" ? signedAddress.value : null;
-  const text = signedText ?? lineOf(kind.value, picture, { keyed, limit });
+  const isOpen = kind.value === "signed" && (!keyed || keyIsNotNeeded.value);
+  const text = signedText ?? lineOf(isOpen ? "url" : kind.value, picture, { keyed, limit });
   return (
     <section class="copy" aria-label={strings.copy.heading}>
       <div class="copy-head">
@@ -88,7 +97,9 @@ export function CopyPanel() {
           ? strings.copy.failed
           : signedText
             ? strings.copy.signedNote
-            : noteOf(picture, keyed)}
+            : isOpen
+              ? strings.copy.openNote
+              : noteOf(picture, keyed)}
       </p>
     </section>
   );

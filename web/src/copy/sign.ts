@@ -21,10 +21,14 @@ export async function signed(url: string, key: string): Promise<string | null> {
   return `${address}&sig=${hex(signature)}`;
 }
 
+/** True if the server shows the address without a key. */
+export async function worksWithoutKey(url: string): Promise<boolean> {
+  return (await fetch(url, { method: "HEAD", credentials: "omit" })).ok;
+}
+
 /** The signed address, if the server shows it without a key: it takes signatures by its first key alone. */
 export async function signedAndTried(url: string, key: string): Promise<string | null> {
   const address = await signed(url, key);
   if (!address) return null;
-  const answer = await fetch(address, { method: "HEAD", credentials: "omit" });
-  return answer.ok ? address : null;
+  return (await worksWithoutKey(address)) ? address : null;
 }

@@ -48,7 +48,7 @@ export const PRESETS: { name: string; look: Look }[] = [
       "wire.edges": "boundary",
       "wire.color": "#f05a1e",
       "wire.thickness": 3,
-      "wire.hidden": "fade",
+      "wire.hidden": "show",
     }),
   },
   { name: "normals", look: of({ "surface.debug": "normal" }) },
