@@ -59,6 +59,8 @@ export const strings = {
     unreachable: "The server does not answer, or ended the upload.",
     flag: (flag: string) => `The server's operator can raise this limit with ${flag}.`,
     choose: "Which of these is the mesh?",
+    noMesh: (formats: string[]) =>
+      `This file is no mesh that this server reads${formats.length > 0 ? ` (${formats.map((n) => n.toUpperCase()).join(", ")})` : ""}.`,
     back: "Back to the picture",
   },
 
@@ -89,6 +91,7 @@ export const strings = {
     hint: "Drag to turn, scroll to zoom, Shift and drag to move, double click to fit",
     touchHint: "Drag to turn, pinch to zoom",
     refused: "The server refused this picture",
+    refusedControl: (control: string, key: string) => `The server refused this picture for “${control}” (${key})`,
     warning: (codes: string) => `Warning: ${codes}`,
     showKey: (key: string) => `Go to ${key}`,
     zoomIn: "Zoom in",
@@ -205,6 +208,8 @@ export const strings = {
     },
     jsonNote: (url: string) => `The request document, for a POST to ${url} as application/json.`,
     keyedNote: "This server asks for keys. Where none can be sent, take the signed URL.",
+    refused: (control: string | null) =>
+      `The server refuses this look, so there is nothing to copy: ${control ? `change or reset “${control}”` : "change it"}, or undo.`,
     openNote: "This server asks for no key, so the plain address works for everyone who reaches it.",
     signedNote: "Shows this picture to everyone, without a key, for a day.",
     keyNote: "MESHSNAP_KEY stands for your key.",

@@ -32,17 +32,29 @@ await run({
 
   "a refused setting is marked, and the last picture stays": async () => {
     const page = await opened(await serve());
-    await page.fill(bySelector("search"), "wire.thickness");
-    await page.fill(`${bySelector("field-wire.thickness")} input[type=text]`, "4000");
-    const answer = page.waitForResponse((one) => one.url().includes("thickness=4000") && one.status() === 400);
+    await page.fill(bySelector("search"), "wire.color");
+    await page.fill(`${bySelector("field-wire.color")} input[type=text]`, "no-colour");
+    const answer = page.waitForResponse((one) => one.url().includes("color=no-colour") && one.status() === 400);
     await page.keyboard.press("Enter");
     const { detail } = await (await answer).json();
     assert.ok((await (await isShown(page, "picture-refusal")).textContent()).includes(detail));
-    await until(page, () => document.querySelector('[data-test="field-wire.thickness"]').classList.contains("is-refused"));
+    await until(page, () => document.querySelector('[data-test="field-wire.color"]').classList.contains("is-refused"));
     assert.ok(await page.isVisible(bySelector("picture")));
+    assert.ok(await page.isDisabled(bySelector("copy")));
     await page.click(bySelector("undo"));
     await isGone(page, "picture-refusal");
     await checkedAddress(page);
+  },
+
+  "numbers are kept in their range, and names of colours become digits": async () => {
+    const page = await opened(await serve());
+    for (const [key, typed, taken] of [["wire.opacity", "2", "1"], ["wire.color", "red", "#ff0000"]]) {
+      await page.fill(bySelector("search"), key);
+      await page.fill(`${bySelector(`field-${key}`)} input[type=text]`, typed);
+      await page.keyboard.press("Enter");
+      const address = new URL(await checkedAddress(page));
+      assert.equal(address.searchParams.get(key), taken);
+    }
   },
 
   "a key is asked for, and a wrong one is said to be wrong": async () => {

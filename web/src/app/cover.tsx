@@ -126,6 +126,9 @@ function Refused() {
           <h2 class="title">
             <bdi>{strings.refused.heading(state.name)}</bdi>
           </h2>
+          {state.code === "mesh_unrecognised" && (
+            <p>{strings.refused.noMesh(capabilities.value?.mesh_formats ?? [])}</p>
+          )}
           <p role="alert" class="refusal-text" data-test="refusal" data-code={state.code}>
             {state.detail}
           </p>

@@ -2,6 +2,7 @@ import { endStep } from "../state/history";
 import { touch } from "../picture/live";
 import { strings } from "../strings";
 import type { Edit } from "./field";
+import { digitsOf } from "./named";
 
 const SWATCHES = ["#000000", "#ffffff", "#e02020", "#f05a1e", "#f2b705", "#2a9d5b", "#1f6feb", "#8c96a0"];
 
@@ -29,7 +30,7 @@ export function ColourInput({ id, edit, fallback, mayBeNone }: Props) {
     endStep();
     if (colour === "") edit.set(undefined);
     else if (mayBeNone && colour === none) edit.set(null);
-    else edit.set(/^([0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})$/i.test(colour) ? `#${colour}` : colour);
+    else edit.set(digitsOf(colour));
   };
   return (
     <div class="colour">
@@ -49,7 +50,11 @@ export function ColourInput({ id, edit, fallback, mayBeNone }: Props) {
         value={edit.value === null ? none : text}
         placeholder={mayBeNone ? none : strings.controls.byDefault}
         spellcheck={false}
-        onChange={(e) => pick(e.currentTarget.value.trim())}
+        onChange={(e) => {
+          const typed = e.currentTarget.value.trim();
+          pick(typed);
+          if (typed !== "" && typed !== none) e.currentTarget.value = digitsOf(typed);
+        }}
       />
       <span class="swatches">
         {SWATCHES.map((colour) => (

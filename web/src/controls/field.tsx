@@ -6,7 +6,8 @@ import type { Value } from "../state/look";
 import { refusedKey, pictureRefusal } from "../state/phase";
 import { strings } from "../strings";
 import { ColourInput } from "./colour";
-import { labelOf, rangeOf } from "./ranges";
+import { backgroundOf } from "./named";
+import { kept, labelOf, rangeOf } from "./ranges";
 import type { Field } from "./schema";
 import { SectionPlanes } from "./section-planes";
 
@@ -180,7 +181,13 @@ function Numeric({ field, edit, id }: Props) {
   const put = (text: string) => {
     const value = Number(text);
     if (text === "" || field.words.includes(text)) edit.set(text === "" ? undefined : text);
-    else if (Number.isFinite(value)) edit.set(value);
+    else if (Number.isFinite(value)) edit.set(kept(field, value));
+  };
+  const putTyped = (box: HTMLInputElement) => {
+    const text = box.value.trim();
+    put(text);
+    // The box shows what was taken, also where that is what it was before.
+    if (text !== "" && Number.isFinite(Number(text))) box.value = String(kept(field, Number(text)));
   };
   const hint = field.words.length > 0 ? field.words.join(", ") : strings.controls.byDefault;
   return (
@@ -213,7 +220,7 @@ function Numeric({ field, edit, id }: Props) {
           edit.value === undefined || edit.value === null ? String(number ?? field.words[0] ?? "") : String(edit.value)
         }
         onFocus={endStep}
-        onChange={(e) => put(e.currentTarget.value.trim())}
+        onChange={(e) => putTyped(e.currentTarget)}
         onKeyDown={(e) => stepByKey(e, number ?? range?.min ?? 0, range?.step ?? 1, put)}
       />
     </div>
@@ -286,6 +293,7 @@ function readText(field: Field, typed: string): Value {
       .filter(Boolean)
       .map((part) => Number(part))
       .filter(Number.isFinite);
+  if (field.kind === "background") return backgroundOf(typed.trim());
   if (field.kind !== "json") return typed.trim();
   try {
     return JSON.parse(typed) as Value;

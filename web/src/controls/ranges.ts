@@ -39,6 +39,11 @@ export function rangeOf(field: Field): Range | null {
   return { min: Math.max(min, field.min ?? min), max: Math.min(max, field.max ?? max), step: stepOf(field, max - min) };
 }
 
+/** The value that the key takes and that is nearest to one that was typed. */
+export function kept({ min, max, whole }: Field, value: number): number {
+  return Math.min(max ?? Infinity, Math.max(min ?? -Infinity, whole ? Math.round(value) : value));
+}
+
 /** Thicknesses in model units: up to a twentieth of the mesh. */
 function inModelUnits(): Range | null {
   const size = (report.value?.bounds as { size?: number[] } | null | undefined)?.size;
@@ -66,4 +71,10 @@ export function labelOf(name: string): { label: string; unit: string } {
   const found = UNITS.find(([ending]) => ending.test(name));
   const bare = found ? name.replace(found[0], "") : name;
   return { label: bare.replaceAll("_", " "), unit: found?.[1] ?? "" };
+}
+
+/** Name of a key's control, as in "Color". */
+export function controlName(key: string): string {
+  const { label } = labelOf(key.split(".").at(-1) ?? key);
+  return label.charAt(0).toUpperCase() + label.slice(1);
 }

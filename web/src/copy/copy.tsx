@@ -3,9 +3,10 @@ import { apiKey } from "../api/key";
 import { finished, wanted } from "../picture/live";
 import { capabilities, stem } from "../state/mesh";
 import { type Picture, pictureAddress } from "../state/address";
-import { announcement } from "../state/phase";
+import { announcement, pictureRefusal } from "../state/phase";
 import { chosenSize, extension, type Format, format, pictureSize, readSize, sizeText } from "../state/size";
 import { strings } from "../strings";
+import { controlName } from "../controls/ranges";
 import { documentAddress, KINDS, type LineKind, lineOf } from "./lines";
 import { signedAndTried, worksWithoutKey } from "./sign";
 
@@ -58,6 +59,7 @@ export function CopyPanel() {
   useSignalEffect(signWhenAsked);
   const picture = wanted.value;
   if (!picture) return null;
+  const refusal = pictureRefusal.value;
   const limit = capabilities.value?.limits?.image_px ?? 4096;
   const keyed = apiKey.value !== null;
   const signedText = kind.value === "signed" ? signedAddress.value : null;
@@ -88,18 +90,26 @@ export function CopyPanel() {
         <pre tabIndex={0} data-test="copy-text" aria-label={strings.copy.kinds[kind.value]}>
           {text}
         </pre>
-        <button type="button" class="primary" data-test="copy" onClick={() => void copyText(text, "line")}>
+        <button
+          type="button"
+          class="primary"
+          data-test="copy"
+          disabled={refusal !== null}
+          onClick={() => void copyText(text, "line")}
+        >
           {copied.value === "line" ? strings.copy.copied : strings.copy.copy}
         </button>
       </div>
       <p class="quiet">
-        {copied.value === "line-failed"
-          ? strings.copy.failed
-          : signedText
-            ? strings.copy.signedNote
-            : isOpen
-              ? strings.copy.openNote
-              : noteOf(picture, keyed)}
+        {refusal
+          ? strings.copy.refused(refusal.key && controlName(refusal.key))
+          : copied.value === "line-failed"
+            ? strings.copy.failed
+            : signedText
+              ? strings.copy.signedNote
+              : isOpen
+                ? strings.copy.openNote
+                : noteOf(picture, keyed)}
       </p>
     </section>
   );
@@ -178,6 +188,12 @@ function DownloadButton() {
   const picture = wanted.value;
   if (!current || !picture) return null;
   const name = `${stem(picture.mesh)}.${extension(current.picture.format)}`;
+  if (pictureRefusal.value)
+    return (
+      <button type="button" disabled data-test="download">
+        {strings.copy.download}
+      </button>
+    );
   return (
     <a class="button" href={current.url} download={name} data-test="download">
       {strings.copy.download}

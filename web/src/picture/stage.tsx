@@ -3,6 +3,7 @@ import { isAtFault } from "../camera/move";
 import { showKey, tab } from "../app/tab";
 import { CompareLayer, HeatText, SideNames } from "../compare/layer";
 import { compare } from "../compare/state";
+import { controlName } from "../controls/ranges";
 import { setKey } from "../state/edit";
 import { canUndo, endStep, look } from "../state/history";
 import { report } from "../state/mesh";
@@ -138,12 +139,12 @@ function Messages() {
   const { key } = refusal;
   return (
     <div class="message is-refusal" role="alert" data-test="picture-refusal">
-      <strong>{strings.picture.refused}</strong>
+      <strong>{key ? strings.picture.refusedControl(controlName(key), key) : strings.picture.refused}</strong>
       <span>{refusal.message}</span>
       {key && (
         <span class="group">
           <button type="button" class="small" onClick={() => showKey(key)} data-test="show-key">
-            {strings.picture.showKey(key)}
+            {strings.picture.showKey(controlName(key))}
           </button>
           {key in look.value.keys && (
             <button
@@ -155,7 +156,7 @@ function Messages() {
                 setKey(key, undefined);
               }}
             >
-              {strings.controls.reset(key)}
+              {strings.controls.reset(controlName(key))}
             </button>
           )}
         </span>

@@ -4,6 +4,7 @@ import { picturePath } from "../state/address";
 import { look } from "../state/history";
 import { effective, isView, type Look, type Value } from "../state/look";
 import { capabilities, mesh } from "../state/mesh";
+import { pictureRefusal } from "../state/phase";
 import { scaledLook } from "../state/scaled";
 import { busy, finished, moving } from "./live";
 import { PRESETS } from "./presets";
@@ -54,7 +55,7 @@ export function startThumbnails(): () => void {
   return effect(() => {
     const open = mesh.value;
     const ready = finished.value;
-    if (!open || !ready || moving.value || busy.value || ready.picture.mesh !== open) return;
+    if (pictureRefusal.value || !open || !ready || moving.value || busy.value || ready.picture.mesh !== open) return;
     const offers = [...styleOffers(), ...presetOffers()];
     const own = ++round;
     const timer = setTimeout(() => void draw(offers, own), 250);
