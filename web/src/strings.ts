@@ -158,6 +158,7 @@ export const strings = {
     layer: (name: string) => `Layer ${name}`,
     general: "general",
     noMatch: (words: string) => `No setting matches “${words}”.`,
+    noCuts: "This server draws no cuts and no exploded views.",
     setKeys: (n: number) => `${plural(n, "setting")} changed`,
   },
 
@@ -337,3 +338,31 @@ export const strings = {
     forbidden: "This key may not see the status: it lacks the scope admin.",
   },
 };
+
+/** Words that people search settings with, and the sections and keys that they mean. */
+export const synonyms: Readonly<Record<string, readonly string[]>> = {
+  line: ["wire"],
+  lines: ["wire"],
+  edge: ["wire", "topology"],
+  border: ["outline"],
+  contour: ["outline"],
+  silhouette: ["outline"],
+  shadow: ["scene.ground"],
+  shadows: ["scene.ground"],
+  floor: ["scene.ground"],
+  zoom: ["camera"],
+  fov: ["camera"],
+  perspective: ["camera"],
+  transparent: ["surface.opacity", "image.background"],
+  transparency: ["surface.opacity", "image.background"],
+  size: ["image"],
+  resolution: ["image"],
+  colour: ["wire.color", "surface.color", "outline.color", "topology"],
+  cut: ["scene.section"],
+  section: ["scene.section"],
+  clip: ["scene.section"],
+  slice: ["scene.section"],
+};
+
+/** Words for what the server does not draw, unless it has a key for it. */
+export const CUTS = /\b(cut|section|clip|slic|explo[ds])/i;

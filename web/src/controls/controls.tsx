@@ -3,7 +3,7 @@ import { resetAll, setKey, setKeys } from "../state/edit";
 import { canRedo, canUndo, endStep, look, redo, undo } from "../state/history";
 import type { Keys, Value } from "../state/look";
 import { refusedKey } from "../state/phase";
-import { strings } from "../strings";
+import { CUTS, strings, synonyms } from "../strings";
 import { type Edit, FieldRow } from "./field";
 import { type Field, type Section, sectionsOf, type Schema } from "./schema";
 
@@ -53,7 +53,11 @@ export function Controls() {
           {strings.controls.resetAll}
         </button>
       </div>
-      {sections.length === 0 && <p class="quiet">{strings.controls.noMatch(search.value)}</p>}
+      {sections.length === 0 && (
+        <p class="quiet">
+          {CUTS.test(search.value) ? strings.controls.noCuts : strings.controls.noMatch(search.value)}
+        </p>
+      )}
       {sections.map((section) => (
         <SectionGroup
           key={section.name}
@@ -77,7 +81,10 @@ function put(section: string, key: string, value: Value | undefined): void {
 function matches(field: Field, words: string[]): boolean {
   const text =
     `${field.key.replaceAll("_", " ")} ${field.key} ${field.description} ${field.words.join(" ")}`.toLowerCase();
-  return words.every((word) => text.includes(word));
+  const isMeant = (word: string) =>
+    Object.hasOwn(synonyms, word) &&
+    synonyms[word]?.some((key) => field.key === key || field.key.startsWith(`${key}.`));
+  return words.every((word) => text.includes(word) || isMeant(word));
 }
 
 interface GroupProps {
