@@ -6,6 +6,7 @@ import type { Vec } from "../camera/vector";
 import { queryOf } from "../state/look";
 import { capabilities, mesh, readingPairs, type OpenMesh } from "../state/mesh";
 import { endStep } from "../state/history";
+import { announcement } from "../state/phase";
 import { strings } from "../strings";
 
 type Check = Verdict["checks"][number];
@@ -13,6 +14,8 @@ type Check = Verdict["checks"][number];
 const STANDARD =
   "watertight,manifold,consistent-winding,no-degenerate,no-duplicate-faces,no-loose-vertices,no-inverted-volume";
 const FAULTS_SHOWN = 20;
+/** More buttons than these are of no use to anyone. */
+const MOST_SHOWN = 2000;
 
 const words = strings.report;
 const rules = signal(STANDARD);
@@ -20,7 +23,24 @@ const verdict = signal<{ of: OpenMesh; checks: Check[] } | { of: OpenMesh; faile
 /** The fault that the camera looks at. */
 const current = signal<string | null>(null);
 
+/** Rules whose faults are all shown. */
+const unfolded = signal<ReadonlySet<string>>(new Set());
+
+/** Shows all faults of a rule, once the server has told where they are. */
+async function unfold(of: OpenMesh, rule: string): Promise<void> {
+  try {
+    const query = queryOf([...readingPairs(of), ["rules", rules.peek()], ["places", "all"]]);
+    const { checks } = await postJson<Verdict>(`v1/check?${query}`, { mesh: of.sha256 });
+    if (verdict.peek()?.of !== of) return;
+    verdict.value = { of, checks };
+    unfolded.value = new Set([...unfolded.peek(), rule]);
+  } catch (error) {
+    announcement.value = error instanceof Error ? error.message : String(error);
+  }
+}
+
 async function check(of: OpenMesh): Promise<void> {
+  unfolded.value = new Set();
   try {
     const query = queryOf([...readingPairs(of), ["rules", rules.peek()]]);
     const { checks } = await postJson<Verdict>(`v1/check?${query}`, { mesh: of.sha256 });
@@ -92,17 +112,26 @@ function Rules() {
 
 function CheckItem({ check: { rule, ok, level, detail, where, found } }: { check: Check }) {
   const state = ok ? "passed" : level === "warn" ? "warned" : "failed";
-  const rest = typeof found === "number" ? found - where.length : 0;
+  const places = where.slice(0, unfolded.value.has(rule) ? MOST_SHOWN : FAULTS_SHOWN);
+  const rest = Math.max(where.length, typeof found === "number" ? found : 0) - places.length;
+  const open = mesh.value;
   return (
     <li class={`check is-${state}`} data-test={`check-${rule}`}>
       <span class="verdict">{words[state]}</span> <strong>{rule}</strong>
       {!ok && <p>{detail}</p>}
       {where.length > 0 && (
         <div class="faults">
-          {where.slice(0, FAULTS_SHOWN).map((place, i) => (
+          {places.map((place, i) => (
             <Fault key={i} id={`${rule}-${i}`} number={i + 1} place={place} />
           ))}
-          {rest > 0 && <span class="quiet">{words.moreFaults(rest)}</span>}
+          {rest > 0 &&
+            (unfolded.value.has(rule) || !open ? (
+              <span class="quiet">{words.moreFaults(rest)}</span>
+            ) : (
+              <button type="button" class="link" data-test={`more-${rule}`} onClick={() => void unfold(open, rule)}>
+                {words.moreFaults(rest)}
+              </button>
+            ))}
         </div>
       )}
     </li>
