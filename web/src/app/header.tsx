@@ -1,4 +1,5 @@
 import { useRef } from "preact/hooks";
+import { address } from "../api/base";
 import { apiKey, forgetKey } from "../api/key";
 import { copied, copyText } from "../copy/copy";
 import { filesOfInput } from "../files/drop";
@@ -41,6 +42,9 @@ export function Header() {
       )}
       {isOpen && (
         <>
+          <a class="status-link" href={address("status")}>
+            {strings.status.title}
+          </a>
           <button
             type="button"
             onClick={() => void copyText(shareLink(), "share")}

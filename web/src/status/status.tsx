@@ -95,6 +95,7 @@ function Tables({ found }: { found: ServerStatus }) {
         />
       </div>
       <Failures found={found} />
+      <Legend />
     </>
   );
 }
@@ -175,6 +176,23 @@ function Failures({ found }: { found: ServerStatus }) {
     <section>
       <h2>{words.failures}</h2>
       <p class="quiet">{words.noFailures}</p>
+    </section>
+  );
+}
+
+/** What the words of the tables mean. */
+function Legend() {
+  return (
+    <section>
+      <h2>{words.legend}</h2>
+      <dl class="legend" data-test="legend">
+        {Object.entries(words.explained).map(([word, meaning]) => (
+          <div key={word}>
+            <dt>{word}</dt>
+            <dd>{meaning}</dd>
+          </div>
+        ))}
+      </dl>
     </section>
   );
 }

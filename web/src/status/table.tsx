@@ -1,5 +1,8 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
+import { strings } from "../strings";
+
+const words = strings.status.explained;
 
 interface Props {
   name: string;
@@ -34,7 +37,7 @@ export function Table({ name, title, columns, rows, text = [0] }: Props) {
               <tr key={r}>
                 {used.map((i) => (
                   <td key={i} class={kind(i)}>
-                    {row[i]}
+                    {explained(row[i])}
                   </td>
                 ))}
               </tr>
@@ -43,6 +46,18 @@ export function Table({ name, title, columns, rows, text = [0] }: Props) {
         </table>
       </div>
     </section>
+  );
+}
+
+/** A word with its explanation, if it has one. */
+function explained(cell: ComponentChildren): ComponentChildren {
+  const help = typeof cell === "string" && Object.hasOwn(words, cell) ? words[cell] : undefined;
+  return help ? (
+    <span class="explained" title={help}>
+      {cell}
+    </span>
+  ) : (
+    cell
   );
 }
 
