@@ -52,8 +52,11 @@ let round = 0;
 
 /** Draws thumbnails one after the other, whenever no picture is under way. */
 export function startThumbnails(): () => void {
+  let of: string | null = null;
   return effect(() => {
     const open = mesh.value;
+    if (open && open.sha256 !== of) forget();
+    of = open?.sha256 ?? of;
     const ready = finished.value;
     if (pictureRefusal.value || !open || !ready || moving.value || busy.value || ready.picture.mesh !== open) return;
     const offers = [...styleOffers(), ...presetOffers()];
@@ -79,6 +82,13 @@ async function patient(path: string): Promise<Blob> {
 }
 
 const addresses = new Map<string, string>();
+
+/** Takes the pictures of another mesh away. */
+function forget(): void {
+  for (const url of Object.values(thumbnails.peek())) URL.revokeObjectURL(url);
+  addresses.clear();
+  thumbnails.value = {};
+}
 
 async function draw(offers: Offer[], own: number): Promise<void> {
   for (const offer of offers) {
