@@ -284,6 +284,8 @@ export const strings = {
     stop: "End",
     left: "Left",
     right: "Right",
+    before: (name: string) => `before: ${name}`,
+    after: (name: string) => `after: ${name}`,
     divider: "Divider between the two pictures",
     heat: "Error heat",
     heatShort: "Heat",

@@ -10,7 +10,7 @@ import { type HeatFigures, paintHeat } from "./heat";
 /** Figures of the heat picture; "other" if the pictures cannot be compared. */
 export const figures = signal<HeatFigures | "other" | null>(null);
 
-/** The left side's picture over the right one, cut at the divider; or their difference. */
+/** The other side's picture over the one of now, cut at the divider; or their difference. */
 export function CompareLayer() {
   if (!compare.value) return null;
   return heat.value ? <Heat /> : <Sides />;
@@ -21,11 +21,13 @@ function Sides() {
   const handle = useRef<HTMLDivElement>(null);
   const { width, height } = shownSize.value;
   const at = divider.value;
+  // A kept look stands to the left, and a mesh that was chosen to the right of the one that was open before.
+  const isRight = compare.value?.mesh !== null;
   useEffect(() => {
     if (image.current) {
       image.current.style.width = `${width}px`;
       image.current.style.height = `${height}px`;
-      image.current.style.clipPath = `inset(0 ${(1 - at) * 100}% 0 0)`;
+      image.current.style.clipPath = isRight ? `inset(0 0 0 ${at * 100}%)` : `inset(0 ${(1 - at) * 100}% 0 0)`;
     }
     if (handle.current) handle.current.style.left = `calc(50% + ${(at - 0.5) * width}px)`;
   });
@@ -36,7 +38,7 @@ function Sides() {
           ref={image}
           class="shot beside"
           src={besideShown.value.url}
-          alt={strings.compare.left}
+          alt={isRight ? strings.compare.right : strings.compare.left}
           draggable={false}
           data-test="beside"
         />
@@ -100,10 +102,10 @@ export function SideNames() {
   return (
     <>
       <span class="side-name is-left">
-        <bdi>{compared.mesh?.name ?? strings.compare.kept}</bdi>
+        <bdi>{compared.mesh ? strings.compare.before(mesh.value?.name ?? "") : strings.compare.kept}</bdi>
       </span>
       <span class="side-name is-right">
-        <bdi>{compared.mesh ? mesh.value?.name : strings.compare.now}</bdi>
+        <bdi>{compared.mesh ? strings.compare.after(compared.mesh.name) : strings.compare.now}</bdi>
       </span>
     </>
   );

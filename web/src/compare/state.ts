@@ -7,14 +7,14 @@ import { look } from "../state/history";
 import { mesh, type OpenMesh } from "../state/mesh";
 import { pictureRefusal } from "../state/phase";
 
-/** What stands on the left side: a look, of this mesh or of another. */
+/** What is compared with the picture of now: a look that was kept, or another mesh. */
 export interface Compared {
   look: Look;
   mesh: OpenMesh | null;
 }
 
 export const compare = signal<Compared | null>(null);
-/** The left side's picture. */
+/** Its picture. */
 export const besideShown = signal<Shown | null>(null);
 export const besideFinished = signal<Shown | null>(null);
 /** The divider, in shares of the width. */
@@ -32,7 +32,7 @@ const loop = new PictureLoop({
   busy: () => undefined,
 });
 
-/** The left side's picture: its own look, seen as the right side is. */
+/** Its picture: its own look, seen as the picture of now is. */
 export function besideOf(picture: Picture, compared: Compared): Picture {
   const view = Object.entries(picture.look.keys).filter(
     ([key]) => isView(key) || /^camera\.(up|projection|fov_deg|margin)$/.test(key),

@@ -12,7 +12,7 @@ const result = signal<{ key: string; difference: Difference | null; failed: stri
 const picture = signal<{ url: string } | "drawing" | { failed: string } | null>(null);
 
 function sides(): { a: string; b: string } | null {
-  const [a, b] = [compare.value?.mesh?.sha256, mesh.value?.sha256];
+  const [a, b] = [mesh.value?.sha256, compare.value?.mesh?.sha256];
   return a && b ? { a, b } : null;
 }
 
