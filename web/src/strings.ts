@@ -28,6 +28,7 @@ export const strings = {
 
   open: {
     heading: "Drop a mesh here",
+    headingTouch: "Choose a mesh",
     what: "The server draws it. Turn it, choose a look, and copy the address, the command or the code that gives the same picture.",
     without: "Or without this page:",
     curl: (render: string) => `curl --data-binary @mesh.obj '${render}?style=wire' -o out.png`,

@@ -32,7 +32,7 @@ function Empty() {
   return (
     <div class="cover is-empty" data-test="empty">
       <DropMark />
-      <h2 class="title">{strings.open.heading}</h2>
+      <h2 class="title">{matchMedia("(hover: none)").matches ? strings.open.headingTouch : strings.open.heading}</h2>
       <p>{strings.open.what}</p>
       <Openers />
       <p class="quiet">
