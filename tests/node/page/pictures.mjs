@@ -8,7 +8,7 @@ import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { bySelector, choose, file, newPage, run, serve, until } from "./lib.mjs";
 
 const KNOT = readFileSync(new URL("../../../api/examples/knot.obj", import.meta.url));
-const GOLDEN = new URL("../../golden/page/", import.meta.url);
+const GOLDEN = new URL("pictures/", import.meta.url);
 
 /** Mean and largest difference of two pictures' cells of 8 x 8 pixels, of 255. */
 async function difference(golden, found) {
@@ -50,8 +50,11 @@ async function shot(width, height, colorScheme) {
   await choose(page, file("knot.obj", KNOT));
   await page.waitForSelector(`${bySelector("picture")}[data-draft="false"]`);
   await until(page, () => {
-    const seen = [...document.images].filter((image) => image.getBoundingClientRect().top < innerHeight);
-    return seen.every((image) => image.complete && image.naturalWidth > 0) && !document.querySelector('[aria-busy="true"]');
+    const isSeen = (element) => element.getClientRects().length > 0 && element.getBoundingClientRect().top < innerHeight;
+    const looks = [...document.querySelectorAll('[data-test^="style-"], [data-test^="preset-"]')].filter(isSeen);
+    const arrived = (image) => image?.complete && image.naturalWidth > 0;
+    const isIdle = !document.querySelector('[aria-busy="true"]');
+    return isIdle && looks.every((look) => arrived(look.querySelector("img"))) && [...document.images].filter(isSeen).every(arrived);
   });
   return page.screenshot({ animations: "disabled", caret: "hide" });
 }

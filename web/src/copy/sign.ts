@@ -21,9 +21,9 @@ export async function signed(url: string, key: string): Promise<string | null> {
   return `${address}&sig=${hex(signature)}`;
 }
 
-/** True if the server shows the address without a key. */
+/** True if the server shows the address without a key. What the browser has kept was fetched with one. */
 export async function worksWithoutKey(url: string): Promise<boolean> {
-  return (await fetch(url, { method: "HEAD", credentials: "omit" })).ok;
+  return (await fetch(url, { method: "HEAD", credentials: "omit", cache: "no-store" })).ok;
 }
 
 /** The signed address, if the server shows it without a key: it takes signatures by its first key alone. */

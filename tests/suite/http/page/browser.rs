@@ -61,7 +61,7 @@ fn lines_to_copy_give_the_bytes_that_are_shown() {
 
 #[test]
 fn troubles_are_said_in_the_servers_words() {
-    passes("troubles.mjs", 6);
+    passes("troubles.mjs", 7);
 }
 
 #[test]
