@@ -45,7 +45,7 @@ await run({
     await page.waitForSelector(bySelector("key-form"), { state: "detached" });
     const other = await newPage();
     await enter(other, "viewer");
-    assert.match(await other.textContent(bySelector("trouble")), /admin/);
+    await until(other, () => document.querySelector('[data-test="trouble"]')?.textContent.includes("admin"));
     assert.equal(await other.locator(bySelector("tiles")).count(), 0);
     // Another key may be given at once.
     await other.fill(bySelector("key"), "boss");
