@@ -52,7 +52,9 @@ fn drawn(rows: &[Row]) -> usize {
 
 /// Sends all meshes of the folders to a server, and fails where one has a fault.
 fn rows_of(folders: &[PathBuf]) -> Vec<Row> {
-    let bench = Bench { server: Server::start(&["--workers", "1"]), has_gpu: gpus().is_some() };
+    // What is compared is files, not times: a busy machine may take long for the largest.
+    let server = Server::start(&["--workers", "1", "--limit-job-ms", "10m"]);
+    let bench = Bench { server, has_gpu: gpus().is_some() };
     let mut rows = Vec::new();
     for folder in folders {
         for path in files(folder).iter().filter(|path| is_mesh(path)) {
